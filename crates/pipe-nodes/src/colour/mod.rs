@@ -1,0 +1,8 @@
+//! Colour and tone.
+
+mod exposure;
+
+use pipe_graph::node::Kind;
+
+/// The kinds of this section, in the order of the reference.
+pub(crate) const KINDS: &[Kind] = &[exposure::KIND];

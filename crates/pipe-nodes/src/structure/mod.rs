@@ -1,0 +1,6 @@
+//! Structure.
+
+use pipe_graph::node::Kind;
+
+/// The kinds of this section, in the order of the reference.
+pub(crate) const KINDS: &[Kind] = &[];

@@ -1,0 +1,1 @@
+//! pipe: a node-graph image pipeline processor on the GPU.
