@@ -5,14 +5,19 @@
 
 pub mod de;
 pub mod diagnostic;
+pub mod document;
 pub mod expr;
 pub mod field;
+pub mod graph;
 pub mod lowering;
 pub mod node;
 pub mod pass;
 pub mod reference;
+pub mod resolve;
 pub mod rim;
 pub mod span;
+pub mod structure;
+pub mod syntax;
 pub mod types;
 
 /// What a node file needs.

@@ -256,8 +256,9 @@ impl Shader {
 /// How a shader is called.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Entry {
-    /// `fn apply(PORT: vec4f, …) -> vec4f`, one argument a read in order; only `Point` reads; may be fused.
-    /// A pass without reads is a source. `pixel()` tells where it is.
+    /// `fn apply(PORT: vec4f, …) -> vec4f`, one argument an image read in order, all of reach `Point`; tables and
+    /// scalars may be read too, by `load_NAME`. May be fused.
+    /// A pass without image reads is a source. `pixel()` tells where it is.
     Point,
     /// `fn at(xy: vec2i) -> vec4f` for an image (`vec3i` for a volume, `i32` for a table) output.
     At,

@@ -4,7 +4,11 @@
 //! turns them into linear, associated RGBA and the last one turns them back, so the bus carries the fewest bytes
 //! and both conversions can be fused into their neighbours.
 
+mod passes;
+
 use serde::Serialize;
+
+pub use passes::{fetch_image, fetch_volume, fetch_words, ingest_image, ingest_volume};
 
 /// The type of a stored sample.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize)]

@@ -1,0 +1,1 @@
+//! The executor of pipe: the only crate that names wgpu.

@@ -1,0 +1,196 @@
+//! Step 1: the fields of every node are read, which tells the edges that it names.
+
+use indexmap::IndexMap;
+
+use super::Resolver;
+use super::scope::Frame;
+use crate::de::{EdgeUse, build_node, from_tree};
+use crate::diagnostic::Diagnostic;
+use crate::document::{Call, Field, Reader, with_nearest};
+use crate::field::In;
+use crate::graph::Options;
+use crate::node::{Kind, Node};
+use crate::span::{Span, Spanned, Syntax, Tree};
+use crate::structure::{Feedback, Iterate, Subgraph};
+
+/// A node whose fields are read and whose edges are not looked up yet.
+pub(super) struct Draft {
+    pub(super) call: Call,
+    pub(super) kind: &'static Kind,
+    pub(super) what: What,
+    /// Edges in the order of the node's [`EdgeIndex`](crate::field::EdgeIndex).
+    pub(super) edges: Vec<EdgeUse>,
+    pub(super) options: Options,
+}
+
+/// What a draft will become.
+pub(super) enum What {
+    Node(Box<dyn Node>),
+    Subgraph { file: Spanned<String>, inputs: Vec<(String, usize)>, params: IndexMap<String, Tree> },
+    Iterate(Box<Body>),
+    Feedback { next: Spanned<String>, delay: u32 },
+}
+
+/// The parts of an `Iterate` that are not plain fields.
+pub(super) struct Body {
+    pub(super) fields: Iterate,
+    /// State names with the edge that each starts from.
+    pub(super) states: Vec<(String, usize)>,
+    pub(super) calls: Vec<Call>,
+    pub(super) next: Vec<(Spanned<String>, Spanned<String>)>,
+    /// Where `until` was written.
+    pub(super) until: Option<Span>,
+}
+
+/// The edge behind a port that was read for a map of ports.
+fn edge_of<T>(ports: &IndexMap<String, In<T>>) -> Vec<(String, usize)> {
+    ports.iter().map(|(name, port)| (name.clone(), port.edge.0 as usize)).collect()
+}
+
+fn take(fields: &mut Vec<Field>, name: &str) -> Option<Field> {
+    fields.iter().position(|(key, _)| key.value == name).map(|i| fields.remove(i))
+}
+
+impl Resolver<'_> {
+    /// Reads one call. `None` when it cannot stand: the mistakes are noted.
+    pub(super) fn draft(&mut self, call: &Call, frame: &Frame<'_>) -> Option<Draft> {
+        let kind = self.registry.get(&call.kind.value)?;
+        let mut call = call.clone();
+        self.apply_settings(&mut call, frame.prefix);
+        let options = call.options.as_ref().map_or_else(Options::default, |tree| {
+            let (options, _, mistakes) = from_tree::<Options>(tree, frame.env);
+            self.diagnostics.extend(mistakes);
+            options.unwrap_or_default()
+        });
+        let (what, edges) = match kind.name {
+            "Subgraph" => self.draft_subgraph(&mut call, frame)?,
+            "Iterate" => self.draft_iterate(&mut call, frame)?,
+            "Feedback" => self.draft_feedback(&mut call, frame)?,
+            _ => {
+                let built = build_node(kind, &call.fields, call.span, frame.env);
+                self.diagnostics.extend(built.diagnostics);
+                (What::Node(built.node?), built.edges)
+            }
+        };
+        Some(Draft { call, kind, what, edges, options })
+    }
+
+    fn apply_settings(&mut self, call: &mut Call, prefix: &str) {
+        let node = format!("{prefix}{}", call.name.value);
+        for setting in &mut self.settings {
+            let Some(field) = setting.name.strip_prefix(&node).and_then(|rest| rest.strip_prefix('.')) else { continue };
+            // What is no field of a Subgraph is a parameter of its graph, set where that is resolved.
+            if call.kind.value == "Subgraph" && !["file", "inputs"].contains(&field) {
+                continue;
+            }
+            setting.used = true;
+            let key = Spanned { span: setting.value.span, value: field.to_owned() };
+            match call.fields.iter_mut().find(|(key, _)| key.value == field) {
+                Some((_, value)) => *value = setting.value.clone(),
+                None => call.fields.push((key, setting.value.clone())),
+            }
+        }
+    }
+
+    fn draft_subgraph(&mut self, call: &mut Call, frame: &Frame<'_>) -> Option<(What, Vec<EdgeUse>)> {
+        let mut params = IndexMap::new();
+        if let Some((_, tree)) = take(&mut call.fields, "params") {
+            let mut reader = Reader { registry: self.registry, diagnostics: self.diagnostics };
+            for (name, value) in reader.entries(&tree, "params") {
+                // Evaluated here, where the outer names are known.
+                let (number, _, mistakes) = match value.value {
+                    Syntax::Bool(b) => (Some(f64::from(u8::from(b))), Vec::new(), Vec::new()),
+                    _ => from_tree::<f64>(value, frame.env),
+                };
+                self.diagnostics.extend(mistakes);
+                if let Some(number) = number {
+                    params.insert(name.value, Tree { span: value.span, value: Syntax::Float(number) });
+                }
+            }
+        }
+        let file = call.fields.iter().find(|(key, _)| key.value == "file").map(|(_, tree)| tree.span);
+        let (fields, edges, mistakes) = self.structure_fields::<Subgraph>(call, frame);
+        self.diagnostics.extend(mistakes);
+        let fields = fields?;
+        let Some(span) = file else {
+            self.diagnostics.push(
+                Diagnostic::error(call.span, "a Subgraph needs a file").label("expected `file: \"name.ron\"`"),
+            );
+            return None;
+        };
+        let inputs = edge_of(&fields.inputs);
+        Some((What::Subgraph { file: Spanned { span, value: fields.file }, inputs, params }, edges))
+    }
+
+    fn draft_iterate(&mut self, call: &mut Call, frame: &Frame<'_>) -> Option<(What, Vec<EdgeUse>)> {
+        let (body, next) = (take(&mut call.fields, "body"), take(&mut call.fields, "next"));
+        let until = call.fields.iter().find(|(key, _)| key.value == "until").map(|(_, tree)| tree.span);
+        let (fields, edges, mistakes) = self.structure_fields::<Iterate>(call, frame);
+        self.diagnostics.extend(mistakes);
+        let mut missing = |what: &str, expected: &str| {
+            self.diagnostics.push(Diagnostic::error(call.span, format!("Iterate has no `{what}`")).label(format!("expected `{expected}`")));
+        };
+        if body.is_none() {
+            missing("body", "body: {nodes…}");
+        }
+        if next.is_none() {
+            missing("next", "next: {\"state\": \"node\"}");
+        }
+        let fields = fields?;
+        if fields.state.is_empty() {
+            missing("state", "state: {\"u\": \"seed\"}");
+        }
+        if fields.count.is_none() == fields.until.is_none() {
+            self.diagnostics.push(
+                Diagnostic::error(call.span, "Iterate takes either `count` or `until`").label("expected exactly one of the two"),
+            );
+        }
+        let (body, next) = (body?.1, next?.1);
+        let mut reader = Reader { registry: self.registry, diagnostics: self.diagnostics };
+        let calls = reader.calls(&body);
+        let next = reader.outputs(&next);
+        let states = edge_of(&fields.state);
+        for (name, _) in &next {
+            if !fields.state.contains_key(&name.value) {
+                let d = Diagnostic::error(name.span, format!("`{}` is no state of this Iterate", name.value));
+                self.diagnostics.push(with_nearest(d, &name.value, fields.state.keys().map(String::as_str)));
+            }
+        }
+        Some((What::Iterate(Box::new(Body { fields, states, calls, next, until })), edges))
+    }
+
+    fn draft_feedback(&mut self, call: &mut Call, frame: &Frame<'_>) -> Option<(What, Vec<EdgeUse>)> {
+        let next = call.fields.iter().find(|(key, _)| key.value == "next").map(|(_, tree)| tree.span);
+        let (fields, edges, mistakes) = self.structure_fields::<Feedback>(call, frame);
+        self.diagnostics.extend(mistakes);
+        let fields = fields?;
+        if self.bodies > 0 {
+            self.diagnostics.push(
+                Diagnostic::error(call.span, "Feedback cannot stand in an Iterate body")
+                    .label("it passes values between frames")
+                    .hint("a `state` passes values between iterations"),
+            );
+            return None;
+        }
+        let Some(next) = next else {
+            self.diagnostics
+                .push(Diagnostic::error(call.span, "Feedback has no `next`").label("expected `next: \"node\"`"));
+            return None;
+        };
+        if !fields.init.is_bound() {
+            self.diagnostics
+                .push(Diagnostic::error(call.span, "missing input `init`").label("expected `init: \"NAME\"`"));
+            return None;
+        }
+        Some((What::Feedback { next: Spanned { span: next, value: fields.next }, delay: fields.delay }, edges))
+    }
+
+    fn structure_fields<T: serde::de::DeserializeOwned>(
+        &self,
+        call: &Call,
+        frame: &Frame<'_>,
+    ) -> (Option<T>, Vec<EdgeUse>, Vec<Diagnostic>) {
+        let tree = Tree { span: call.span, value: Syntax::Struct(Some(call.kind.clone()), call.fields.clone()) };
+        from_tree::<T>(&tree, frame.env)
+    }
+}

@@ -1,0 +1,1 @@
+//! Images, volumes and tables between files and host memory.

@@ -1,0 +1,240 @@
+//! The plan: steps over physical slots. Plain data, made by [`crate::plan`], printed by `pipe plan`, run by the
+//! executor. The same graph, sizes and limits give the same plan, byte for byte, on every machine.
+//!
+//! **Invariants** that holding a `Plan` proves: no slot holds two live resources; every step reads what an
+//! earlier step wrote; a loop leaves its states in the slots that later steps read.
+
+use std::ops::Range;
+use std::sync::Arc;
+
+use pipe_graph::pass::Limits;
+use pipe_graph::types::{ImageType, VolumeType};
+use serde::Serialize;
+
+/// Index of a slot in [`Plan::slots`].
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize)]
+pub struct SlotId(pub u32);
+
+/// Index of a kernel in [`Plan::kernels`].
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize)]
+pub struct KernelId(pub u32);
+
+/// Physical storage of one kind; resources of equal storage may take turns in it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Storage {
+    /// A 2D texture.
+    Image(ImageType),
+    /// A 3D texture.
+    Volume(VolumeType),
+    /// A storage buffer; a multiple of 4 bytes, at least 16.
+    Buffer {
+        /// Size in bytes.
+        bytes: u64,
+    },
+}
+
+impl Storage {
+    /// Bytes that it takes.
+    pub const fn bytes(&self) -> u64 {
+        match self {
+            Self::Image(t) => t.size[0] as u64 * t.size[1] as u64 * t.channels as u64 * t.precision.bytes(),
+            Self::Volume(t) => {
+                t.size[0] as u64 * t.size[1] as u64 * t.size[2] as u64 * t.channels as u64 * t.precision.bytes()
+            }
+            Self::Buffer { bytes } => *bytes,
+        }
+    }
+}
+
+/// One slot.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Slot {
+    /// What it is made of.
+    pub storage: Storage,
+    /// Whether the host fills it (externals, literals): CPU adapters map it instead of copying.
+    pub uploaded: bool,
+    /// Whether the host reads it at the end.
+    pub fetched: bool,
+    /// Whether it outlives a run: the history of a `Feedback`.
+    pub persistent: bool,
+}
+
+/// What a binding of a kernel is. Binding numbers are positions in [`Kernel::bindings`], all in group 0.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Binding {
+    /// The kernel's uniform block.
+    Uniform {
+        /// Its size in bytes, a multiple of 16.
+        bytes: u32,
+    },
+    /// `texture_2d<f32>`, read by `textureLoad` only.
+    SampledImage,
+    /// `texture_3d<f32>`, likewise.
+    SampledVolume,
+    /// `texture_storage_2d<FORMAT, write>`
+    StorageImage(ImageType),
+    /// `texture_storage_3d<FORMAT, write>`
+    StorageVolume(VolumeType),
+    /// `var<storage, read>`
+    ReadBuffer,
+    /// `var<storage, read_write>`
+    WriteBuffer,
+}
+
+/// How a kernel is launched.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Launch {
+    /// A compute shader; its entry point is `main`.
+    Compute,
+    /// Points drawn with additive blending (source One, destination One) into one cleared colour target;
+    /// entry points `vertex_main` and `fragment_main`.
+    Points(ImageType),
+}
+
+/// A shader module with its interface. Equal kernels occur once in a plan.
+#[derive(Debug, Clone, PartialEq, Eq, Hash)]
+pub struct Kernel {
+    /// For messages: the names of the shader files in it.
+    pub label: String,
+    /// The whole WGSL text.
+    pub wgsl: Arc<str>,
+    /// What it binds in group 0.
+    pub bindings: Vec<Binding>,
+    /// Compute or draw.
+    pub launch: Launch,
+    /// Whether it may be built without bounds checks and loop bounding: no user shader is in it.
+    pub trusted: bool,
+}
+
+/// One launch.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Run {
+    /// Name of the pass (fused: names joined by `+`).
+    pub name: String,
+    /// Names of the nodes that it does the work of.
+    pub nodes: Vec<String>,
+    /// What is launched.
+    pub kernel: KernelId,
+    /// Slots for the kernel's bindings, the uniform block left out.
+    pub slots: Vec<SlotId>,
+    /// Offset of the uniform block in [`Plan::uniforms`], a multiple of 256.
+    pub uniform_offset: u32,
+    /// Workgroups; for points `[points, 1, 1]`.
+    pub groups: [u32; 3],
+    /// Slots that are filled with zeros before it.
+    pub clears: Vec<SlotId>,
+    /// Bytes that it reads and writes at least once.
+    pub bytes: u64,
+    /// Names of the resources it reads and writes, for `pipe plan`.
+    pub reads: Vec<String>,
+    /// As above.
+    pub writes: Vec<String>,
+}
+
+/// A loop. Iteration 0 runs `first`, which reads the initial states; then `odd` and `even` alternate
+/// (iteration 1 is odd), so that states ping-pong without a copy.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Repeat {
+    /// For messages.
+    pub name: String,
+    /// The node it came from.
+    pub node: String,
+    /// Iteration 0.
+    pub first: Vec<Step>,
+    /// Iterations 1, 3, 5, …
+    pub odd: Vec<Step>,
+    /// Iterations 2, 4, 6, …
+    pub even: Vec<Step>,
+    /// How often.
+    pub count: Times,
+    /// Pairs (written by the last odd iteration, where later steps look), copied when a loop of unknown length
+    /// ends after an even number of iterations; empty when the length is known.
+    pub settle: Vec<(SlotId, SlotId)>,
+}
+
+/// When a loop ends.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Times {
+    /// After so many iterations, at least 1.
+    Fixed(u32),
+    /// When the value is below the limit.
+    Until {
+        /// Slot of the scalar as (even iterations and the first, odd iterations) write it.
+        value: [SlotId; 2],
+        /// The bound; NaN never passes.
+        limit: f32,
+        /// Iterations between checks.
+        every: u32,
+        /// The most iterations.
+        max: u32,
+    },
+}
+
+/// One thing that happens.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Step {
+    /// A launch.
+    Run(Run),
+    /// A loop.
+    Repeat(Repeat),
+}
+
+/// Bytes of an external that the host writes into a slot before the first step.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Upload {
+    /// Name of the external.
+    pub name: String,
+    /// Byte ranges of the external, concatenated in the slot.
+    pub ranges: Vec<Range<u64>>,
+    /// Where to.
+    pub slot: SlotId,
+}
+
+/// What comes back after the last step.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Fetched {
+    /// Name that the caller asks by.
+    pub name: String,
+    /// Slots with the byte range of the whole that each holds from its offset 0.
+    pub parts: Vec<(SlotId, Range<u64>)>,
+}
+
+/// A value kept between frames: after a run the newest is in `slots[0]`; the executor rotates the ring.
+#[derive(Debug, Clone, PartialEq)]
+pub struct History {
+    /// Name across frames.
+    pub name: String,
+    /// Ring of `delay + 1` slots: this run writes `slots[0]` and reads `slots[delay]`.
+    pub slots: Vec<SlotId>,
+}
+
+/// Everything that the executor needs.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Plan {
+    /// Name of the graph.
+    pub name: String,
+    /// The device it was made for.
+    pub limits: Limits,
+    /// Physical storage.
+    pub slots: Vec<Slot>,
+    /// Distinct kernels.
+    pub kernels: Vec<Kernel>,
+    /// Content of the uniform buffer.
+    pub uniforms: Vec<u8>,
+    /// Tables known when planning.
+    pub literals: Vec<(SlotId, Arc<[u8]>)>,
+    /// What the host supplies.
+    pub uploads: Vec<Upload>,
+    /// What happens.
+    pub steps: Vec<Step>,
+    /// What comes back.
+    pub fetches: Vec<Fetched>,
+    /// What is kept for later frames.
+    pub histories: Vec<History>,
+    /// Most bytes alive at once: what the slots take together.
+    pub peak_bytes: u64,
+    /// What it would take without sharing.
+    pub naive_bytes: u64,
+    /// Bytes that all steps read and write.
+    pub bytes_moved: u64,
+}
