@@ -50,7 +50,8 @@ impl<'t> Reader<'t> {
             line_start + line.char_indices().nth(p.col.saturating_sub(1)).map_or(line.len(), |(i, _)| i)
         };
         let start = at(error.span.start).min(self.text.len());
-        let end = at(error.span.end).clamp(start, self.text.len());
+        let one = self.text[start..].chars().next().map_or(0, char::len_utf8);
+        let end = at(error.span.end).clamp(start + one, self.text.len());
         let message = error.code.to_string();
         let mut d = Diagnostic::error(Span::new(self.file, start..end), lower_first(&message)).label("here");
         if matches!(error.code, ron::Error::ExceededRecursionLimit) {
@@ -239,7 +240,7 @@ mod tests {
     #[test]
     fn syntax_errors_have_a_place() {
         let d = parse_tree("Graph(\n  version: 1,\n  nodes: {,\n)", FileId(0)).expect_err("broken");
-        assert_eq!(d.span.start, 30, "{d:?}");
+        assert_eq!(d.span.start, 31, "{d:?}");
     }
 
     #[test]

@@ -55,8 +55,6 @@ pub struct Slot {
     pub uploaded: bool,
     /// Whether the host reads it at the end.
     pub fetched: bool,
-    /// Whether it outlives a run: the history of a `Feedback`.
-    pub persistent: bool,
 }
 
 /// What a binding of a kernel is. Binding numbers are positions in [`Kernel::bindings`], all in group 0.
@@ -147,8 +145,9 @@ pub struct Repeat {
     pub even: Vec<Step>,
     /// How often.
     pub count: Times,
-    /// Pairs (written by the last odd iteration, where later steps look), copied when a loop of unknown length
-    /// ends after an even number of iterations; empty when the length is known.
+    /// For a loop of unknown length: pairs (written by `first` and `even`, written by `odd`). Later steps read the
+    /// second of each pair, so when the last iteration was no odd one the first is copied there. Empty when the
+    /// length is known: then later steps read the slot that the last iteration wrote.
     pub settle: Vec<(SlotId, SlotId)>,
 }
 
@@ -199,13 +198,17 @@ pub struct Fetched {
     pub parts: Vec<(SlotId, Range<u64>)>,
 }
 
-/// A value kept between frames: after a run the newest is in `slots[0]`; the executor rotates the ring.
+/// A value kept between frames. The executor keeps copies of the last `delay` values of `keep` under this name.
 #[derive(Debug, Clone, PartialEq)]
 pub struct History {
     /// Name across frames.
     pub name: String,
-    /// Ring of `delay + 1` slots: this run writes `slots[0]` and reads `slots[delay]`.
-    pub slots: Vec<SlotId>,
+    /// How many frames the value waits.
+    pub delay: u32,
+    /// Slot that holds the new value after the last step.
+    pub keep: SlotId,
+    /// Slot that is filled with the value of `delay` frames ago before the first step, once there is one.
+    pub recall: Option<SlotId>,
 }
 
 /// Everything that the executor needs.

@@ -97,7 +97,7 @@ pub fn ingest_image(cx: &mut Lowering<'_>, name: &str, form: &PixelForm) -> Reso
         let tail = if whole {
             "fn apply() -> vec4f { return decode(pixel().x, pixel().y); }"
         } else {
-            "fn each(xy: vec3i) { store_out(vec2i(xy.x, FIRST_ROW + xy.y), decode(xy.x, xy.y)); }"
+            "fn each(xy: vec2i) { store_out(vec2i(xy.x, FIRST_ROW + xy.y), decode(xy.x, xy.y)); }"
         };
         let pass = cx.pass("decode", shader!("io/ingest", format!("{}{tail}\n", word_function(ports.len()))));
         let mut pass = describe(pass, form).constant("FIRST_ROW", band.rows.start as i32);

@@ -1,0 +1,150 @@
+//! The uniform block of a kernel: parameters of all its stages, laid out by WGSL's rules, and `params` in each stage.
+
+use std::fmt::Write as _;
+
+use pipe_graph::pass::{Constant, Entry, ResourceId, Value};
+
+use crate::kernel_pass::{KernelPass, Stage};
+
+/// Where each parameter stands.
+pub(super) struct Block {
+    fields: Vec<Field>,
+    kernel: bool,
+}
+
+struct Field {
+    stage: usize,
+    name: String,
+    ty: &'static str,
+    offset: usize,
+    bytes: usize,
+}
+
+/// WGSL type, alignment and size.
+fn layout(value: &Value) -> (&'static str, usize, usize) {
+    match value {
+        Value::F32(_) | Value::Driven(_) => ("f32", 4, 4),
+        Value::I32(_) => ("i32", 4, 4),
+        Value::U32(_) => ("u32", 4, 4),
+        Value::Vec2(_) => ("vec2f", 8, 8),
+        Value::Vec3(_) => ("vec3f", 16, 12),
+        Value::Vec4(_) => ("vec4f", 16, 16),
+        Value::Vec2I(_) => ("vec2i", 8, 8),
+        Value::Vec3I(_) => ("vec3i", 16, 12),
+    }
+}
+
+fn words(value: &Value) -> Vec<u8> {
+    fn all<const N: usize, T: Copy>(v: &[T; N], bytes: fn(T) -> [u8; 4]) -> Vec<u8> {
+        v.iter().flat_map(|x| bytes(*x)).collect()
+    }
+    match value {
+        Value::F32(v) => v.to_le_bytes().to_vec(),
+        Value::I32(v) => v.to_le_bytes().to_vec(),
+        Value::U32(v) => v.to_le_bytes().to_vec(),
+        Value::Vec2(v) => all(v, f32::to_le_bytes),
+        Value::Vec3(v) => all(v, f32::to_le_bytes),
+        Value::Vec4(v) => all(v, f32::to_le_bytes),
+        Value::Vec2I(v) => all(v, i32::to_le_bytes),
+        Value::Vec3I(v) => all(v, i32::to_le_bytes),
+        Value::Driven(_) => vec![0; 4],
+    }
+}
+
+impl Block {
+    pub(super) fn new(pass: &KernelPass) -> Self {
+        let kernel = pass.last().entry == Entry::Kernel;
+        let mut fields = Vec::new();
+        let mut offset = 0_usize;
+        for (stage, s) in pass.stages.iter().enumerate() {
+            for (name, value) in &s.params {
+                if matches!(value, Value::Driven(_)) {
+                    continue;
+                }
+                let (ty, align, bytes) = layout(value);
+                offset = offset.next_multiple_of(align);
+                fields.push(Field { stage, name: name.clone(), ty, offset, bytes });
+                offset += bytes;
+            }
+        }
+        Self { fields, kernel }
+    }
+
+    /// The content, padded to 16 bytes; empty when there are no parameters.
+    pub(super) fn bytes(&self, pass: &KernelPass) -> Vec<u8> {
+        let end = self.fields.last().map_or(0, |f| f.offset + f.bytes);
+        let mut out = vec![0; end.next_multiple_of(16)];
+        for f in &self.fields {
+            out[f.offset..f.offset + f.bytes].copy_from_slice(&words(&pass.stages[f.stage].params[&f.name]));
+        }
+        out
+    }
+
+    pub(super) fn declaration(&self) -> String {
+        let fields: String = self.fields.iter().map(|f| format!("    s{}_{}: {},\n", f.stage, f.name, f.ty)).collect();
+        format!("struct Uniforms {{\n{fields}}}\n@group(0) @binding(0) var<uniform> uniforms: Uniforms;\n")
+    }
+
+    /// `params` of one stage: private, filled at the start of the entry point by `bind_params`; in a `Kernel`, which
+    /// has an entry point of its own, by a call that is put at the start of it.
+    pub(super) fn params(&self, text: &mut String, stage: usize, s: &Stage, drivers: &[ResourceId]) {
+        if s.params.is_empty() {
+            return;
+        }
+        let mut members = String::new();
+        let mut values = Vec::new();
+        for (name, value) in &s.params {
+            let _ = writeln!(members, "    {name}: {},", layout(value).0);
+            values.push(match value {
+                Value::Driven(id) => {
+                    let d = drivers.iter().position(|r| r == id).expect("drivers are those of the stages");
+                    format!("package::io::d{d}.x")
+                }
+                _ => format!("package::io::uniforms.s{stage}_{name}"),
+            });
+        }
+        let _ = write!(
+            text,
+            "struct Params {{\n{members}}}\nvar<private> params: Params;\nfn bind_params() {{ params = Params({}); }}\n",
+            values.join(", ")
+        );
+        if self.kernel
+            && let Some(at) = body_of_main(text)
+        {
+            text.insert_str(at, " bind_params(); ");
+        }
+    }
+}
+
+/// Just behind the brace that opens the body of `fn main`.
+fn body_of_main(text: &str) -> Option<usize> {
+    let mut from = 0;
+    let main = loop {
+        let at = from + text[from..].find("fn main")?;
+        let line = text[..at].rfind('\n').map_or(0, |i| i + 1);
+        if !text[line..at].contains("//") {
+            break at;
+        }
+        from = at + 1;
+    };
+    let mut depth = 0;
+    let open = text[main..].char_indices().find_map(|(i, c)| {
+        match c {
+            '(' => depth += 1,
+            ')' => depth -= 1,
+            '{' if depth == 0 => return Some(main + i + 1),
+            _ => {}
+        }
+        None
+    });
+    open
+}
+
+pub(super) fn constant(name: &str, value: Constant) -> String {
+    match value {
+        Constant::I32(v) => format!("const {name}: i32 = i32({v});\n"),
+        Constant::U32(v) => format!("const {name}: u32 = {v}u;\n"),
+        Constant::F32(v) => format!("const {name}: f32 = {v:?}f;\n"),
+        Constant::Bool(v) => format!("const {name}: bool = {v};\n"),
+    }
+}

@@ -1,0 +1,257 @@
+//! Passes → WGSL. What shaders may say is fixed in `shaders/README.md`; this module makes it true.
+//!
+//! A kernel is a set of WESL modules, put together by the `wesl` crate into one WGSL text:
+//!
+//! - `package::lib::…`: the shared functions of `shaders/lib`,
+//! - `package::io`: bindings, the uniform block, and raw access to every bound resource,
+//! - `package::s0`, `package::s1` …: each stage's shader behind a generated prelude of ports, parameters and
+//!   constants, so the same shader can stand many times in one kernel without renaming by hand,
+//! - `package::main`: the entry point, which covers the grid and calls the last stage.
+//!
+//! A `Kernel` shader has its own entry point; its stage is the main module itself.
+//!
+//! Texts are made first and put together at the end, in parallel, once for each distinct kernel.
+
+mod entry;
+mod layout;
+mod ports;
+
+use std::collections::BTreeMap;
+use std::fmt::Write as _;
+use std::sync::Arc;
+
+use indexmap::IndexMap;
+use pipe_graph::pass::{Access, Entry, Limits, ResourceId, Shape};
+
+use crate::PlanError;
+use crate::kernel_pass::{KernelPass, Ops, Source};
+use crate::plan::{Binding, Kernel, KernelId, Launch};
+
+/// The shared functions, by module name.
+pub const LIBRARY: &[(&str, &str)] = &include!(concat!(env!("OUT_DIR"), "/library.rs"));
+
+/// What a composed pass binds and launches.
+pub(crate) struct Composed {
+    pub(crate) kernel: KernelId,
+    /// Bound resources in binding order, the uniform block left out.
+    pub(crate) resources: Vec<ResourceId>,
+    pub(crate) uniforms: Vec<u8>,
+    pub(crate) groups: [u32; 3],
+}
+
+/// A kernel whose modules are written and not put together yet.
+#[derive(Debug, Clone, PartialEq, Eq, Hash, PartialOrd, Ord)]
+struct Source0 {
+    /// Module name and text; the main module last.
+    modules: Vec<(String, String)>,
+    trusted: bool,
+}
+
+/// Composes kernels and keeps one of each.
+pub(crate) struct Composer<'a> {
+    limits: &'a Limits,
+    ops: &'a Ops,
+    kernels: IndexMap<Source0, Kernel>,
+}
+
+/// A bound resource.
+struct Bound {
+    resource: ResourceId,
+    shape: Shape,
+    use_: Use,
+}
+
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Use {
+    Read,
+    Write(Access),
+}
+
+impl<'a> Composer<'a> {
+    pub(crate) fn new(limits: &'a Limits, ops: &'a Ops) -> Self {
+        Self { limits, ops, kernels: IndexMap::new() }
+    }
+
+    pub(crate) fn limits(&self) -> &'a Limits {
+        self.limits
+    }
+
+    /// Writes the modules of a pass.
+    pub(crate) fn compose(&mut self, pass: &KernelPass) -> Result<Composed, PlanError> {
+        let bound = self.bound(pass);
+        let drivers: Vec<ResourceId> = distinct(pass.drivers());
+        let block = layout::Block::new(pass);
+        let uniforms = block.bytes(pass);
+        let has_uniform = !uniforms.is_empty();
+        let kernel_entry = pass.last().entry == Entry::Kernel;
+
+        let mut bindings = Vec::new();
+        let mut io = String::new();
+        if has_uniform {
+            bindings.push(Binding::Uniform { bytes: uniforms.len() as u32 });
+            io.push_str(&block.declaration());
+        }
+        let mut resources = Vec::new();
+        for (i, b) in bound.iter().enumerate() {
+            let at = bindings.len();
+            bindings.push(ports::binding(b.shape, b.use_, self.limits));
+            resources.push(b.resource);
+            ports::declare(&mut io, i, at, b.shape, b.use_, self.limits);
+        }
+        for (i, id) in drivers.iter().enumerate() {
+            let at = bindings.len();
+            bindings.push(Binding::ReadBuffer);
+            resources.push(*id);
+            let _ = writeln!(io, "@group(0) @binding({at}) var<storage, read> d{i}: vec4f;");
+        }
+        io.push_str("var<private> current: vec2i;\n");
+
+        let index = |id: ResourceId, write: bool| {
+            let found = bound.iter().position(|b| b.resource == id && (b.use_ != Use::Read) == write);
+            found.expect("everything that a pass names is bound")
+        };
+        let mut modules = vec![("io".to_owned(), io)];
+        let main = pass.stages.len() - 1;
+        for (s, stage) in pass.stages.iter().enumerate() {
+            let mut text = String::new();
+            // The user's text comes first, so that its lines keep their numbers.
+            text.push_str(&stage.shader.source);
+            text.push('\n');
+            for (name, constant) in &stage.constants {
+                text.push_str(&layout::constant(name, *constant));
+            }
+            for port in &stage.ports {
+                let raw = match port.source {
+                    Source::Read(r) => ports::Raw::Bound(index(pass.reads[r], false)),
+                    Source::Stage(producer) => ports::Raw::Stage { producer, size: self.size_source(pass, producer, &index) },
+                };
+                ports::read_port(&mut text, port, raw);
+            }
+            for write in pass.writes.iter().filter(|w| w.stage == s) {
+                let i = index(write.resource, true);
+                ports::write_port(&mut text, &write.port, i, self.ops.shape(write.resource), write.access);
+            }
+            block.params(&mut text, s, stage, &drivers);
+            let size = pass.writes.iter().find(|w| w.stage == s).or(pass.writes.first()).map(|w| index(w.resource, true));
+            ports::place(&mut text, size.expect("a pass writes something"), stage);
+            if stage.entry == Entry::Point {
+                ports::point_value(&mut text, s, pass, &index);
+            }
+            let name = if kernel_entry && s == main { "main".to_owned() } else { format!("s{s}") };
+            modules.push((name, text));
+        }
+        let grid = entry::Cover::new(pass, self.ops, self.limits)?;
+        if !kernel_entry {
+            modules.push(("main".to_owned(), entry::main_module(pass, &grid, &block, self.ops, &index)));
+        }
+        let trusted = pass.stages.iter().all(|s| s.shader.trusted);
+        let labels: Vec<&str> = pass.stages.iter().map(|s| &*s.shader.path).collect();
+        let launch = match (pass.last().entry, self.ops.shape(pass.writes[0].resource)) {
+            (Entry::Points, Shape::Image(t)) => Launch::Points(t),
+            _ => Launch::Compute,
+        };
+        self.within_limits(pass, &bindings)?;
+        let kernel = Kernel { label: labels.join(" + "), wgsl: Arc::from(""), bindings, launch, trusted };
+        let entry = self.kernels.entry(Source0 { modules, trusted });
+        let id = KernelId(entry.index() as u32);
+        entry.or_insert(kernel);
+        Ok(Composed { kernel: id, resources, uniforms, groups: grid.groups })
+    }
+
+    fn bound(&self, pass: &KernelPass) -> Vec<Bound> {
+        let read = |id: &ResourceId| Bound { resource: *id, shape: self.ops.shape(*id), use_: Use::Read };
+        let mut bound: Vec<Bound> = pass.reads.iter().map(read).collect();
+        // The render target of points is an attachment, not a binding.
+        let points = pass.last().entry == Entry::Points;
+        bound.extend(pass.writes.iter().filter(|_| !points).map(|w| Bound {
+            resource: w.resource,
+            shape: self.ops.shape(w.resource),
+            use_: Use::Write(w.access),
+        }));
+        bound
+    }
+
+    /// A bound read of the size of a stage's value: the first image that its chain of producers loads.
+    fn size_source(&self, pass: &KernelPass, stage: usize, index: &dyn Fn(ResourceId, bool) -> usize) -> ports::Size {
+        let mut at = stage;
+        loop {
+            let image = pass.stages[at].ports.iter().find(|p| matches!(p.shape, Shape::Image(_) | Shape::Volume(_)));
+            match image.map(|p| p.source) {
+                Some(Source::Read(r)) => return ports::Size::Bound(index(pass.reads[r], false)),
+                Some(Source::Stage(next)) => at = next,
+                None => return ports::Size::Fixed(pass.stages[stage].shape),
+            }
+        }
+    }
+
+    fn within_limits(&self, pass: &KernelPass, bindings: &[Binding]) -> Result<(), PlanError> {
+        let count = |f: fn(&Binding) -> bool| bindings.iter().filter(|b| f(b)).count() as u32;
+        let sampled = count(|b| matches!(b, Binding::SampledImage | Binding::SampledVolume));
+        let stored = count(|b| matches!(b, Binding::StorageImage(_) | Binding::StorageVolume(_)));
+        let buffers = count(|b| matches!(b, Binding::ReadBuffer | Binding::WriteBuffer));
+        let l = self.limits;
+        for (what, has, most) in [
+            ("images to read", sampled, l.max_sampled_images),
+            ("images to write", stored, l.max_storage_images),
+            ("tables and scalars", buffers, l.max_storage_buffers),
+        ] {
+            if has > most {
+                return Err(PlanError::TooManyBindings { name: pass.name.clone(), what, has, most });
+            }
+        }
+        Ok(())
+    }
+
+    /// Puts every kernel together.
+    pub(crate) fn finish(self) -> Result<Vec<Kernel>, PlanError> {
+        let list: Vec<(Source0, Kernel)> = self.kernels.into_iter().collect();
+        let workers = std::thread::available_parallelism().map_or(1, std::num::NonZero::get).min(list.len().max(1));
+        let mut texts: BTreeMap<usize, Result<String, String>> = BTreeMap::new();
+        std::thread::scope(|scope| {
+            let share = |w: usize| {
+                let list = &list;
+                move || -> Vec<(usize, Result<String, String>)> {
+                    (w..list.len()).step_by(workers).map(|i| (i, put_together(&list[i].0.modules))).collect()
+                }
+            };
+            let threads: Vec<_> = (0..workers).map(|w| scope.spawn(share(w))).collect();
+            for thread in threads {
+                match thread.join() {
+                    Ok(part) => texts.extend(part),
+                    Err(panic) => std::panic::resume_unwind(panic),
+                }
+            }
+        });
+        let finish = |((_, mut kernel), (_, text)): ((Source0, Kernel), (usize, Result<String, String>))| {
+            kernel.wgsl = text.map_err(|message| PlanError::Shader { label: kernel.label.clone(), message })?.into();
+            Ok(kernel)
+        };
+        list.into_iter().zip(texts).map(finish).collect()
+    }
+}
+
+fn distinct(ids: impl Iterator<Item = ResourceId>) -> Vec<ResourceId> {
+    let mut out: Vec<ResourceId> = Vec::new();
+    for id in ids {
+        if !out.contains(&id) {
+            out.push(id);
+        }
+    }
+    out
+}
+
+/// One WGSL text from the modules; the last is the main one.
+fn put_together(modules: &[(String, String)]) -> Result<String, String> {
+    let mut resolver = wesl::VirtualResolver::new();
+    let path = |name: &str| -> Result<wesl::ModulePath, String> { format!("package::{name}").parse().map_err(|e| format!("{e:?}")) };
+    for (name, text) in LIBRARY {
+        resolver.add_module(path(&format!("lib::{name}"))?, (*text).into());
+    }
+    for (name, text) in modules {
+        resolver.add_module(path(name)?, text.as_str().into());
+    }
+    let mut compiler = wesl::Wesl::new_barebones().set_custom_resolver(resolver);
+    compiler.use_imports(true).use_stripping(true).use_sourcemap(true).set_mangler(wesl::ManglerKind::Escape);
+    let result = compiler.compile(&path("main")?).map_err(|e| e.to_string())?;
+    Ok(result.to_string())
+}

@@ -1,0 +1,38 @@
+//! Why a graph cannot be planned for a device.
+
+/// What stands in the way.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[allow(missing_docs)]
+pub enum PlanError {
+    /// An image is wider or higher than the device can hold.
+    #[error("`{name}` is {}x{}, but the device holds images of at most {most} pixels a side\n  next: shrink it with Resize, or cut it with Crop", size[0], size[1])]
+    ImageTooLarge { name: String, size: [u32; 2], most: u32 },
+    /// A volume is larger than the device can hold.
+    #[error("`{name}` is {}x{}x{}, but the device holds volumes of at most {most} voxels a side\n  next: shrink it with VolumeResample", size[0], size[1], size[2])]
+    VolumeTooLarge { name: String, size: [u32; 3], most: u32 },
+    /// A table is longer than a shader can bind.
+    #[error("`{name}` takes {bytes} bytes, but a shader of this device binds at most {most}\n  next: use fewer entries")]
+    TableTooLarge { name: String, bytes: u64, most: u64 },
+    /// A pass needs more resources at once than the device can bind.
+    #[error("`{name}` needs {has} {what} at once, the device has {most}\n  next: split it into several nodes")]
+    TooManyBindings { name: String, what: &'static str, has: u32, most: u32 },
+    /// A grid is larger than a dispatch may be.
+    #[error("`{name}` needs {groups:?} workgroups, the device runs at most {most} along each axis")]
+    TooManyGroups { name: String, groups: [u32; 3], most: u32 },
+    /// A shader cannot be composed.
+    #[error("cannot compose {label}:\n{message}")]
+    Shader { label: String, message: String },
+    /// The plan does not fit the budget.
+    #[error(
+        "the plan needs {} at once, the budget is {}; the largest part is `{name}` with {}\n  next: give it more with --vram, shrink the image, or use options: (format: F16)",
+        mib(needed), mib(budget), mib(bytes)
+    )]
+    Budget { needed: u64, budget: u64, alive: usize, name: String, bytes: u64 },
+    /// A node refused to be lowered.
+    #[error("`{name}` {message}")]
+    Node { name: String, message: String },
+}
+
+fn mib(bytes: &u64) -> String {
+    format!("{:.1} MiB", *bytes as f64 / f64::from(1 << 20))
+}

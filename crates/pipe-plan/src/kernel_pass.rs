@@ -1,0 +1,217 @@
+//! What the phases between lowering and scheduling work on: passes that may consist of several stages.
+//!
+//! A stage is one shader instance. Where a stage reads a pixel, it either loads a resource or asks an earlier
+//! stage for its value at that place; so fusing two passes is nothing but putting both stages into one pass and
+//! turning a load into such a question. A pass as a node declared it has one stage.
+
+use indexmap::IndexMap;
+use pipe_graph::pass::{
+    Access, Border, Constant, Count, Entry, Filter, Grid, Item, NodeLabel, Pass, PassGraph, Reach, Resource, ResourceId, Shader,
+    Shape, State, Value,
+};
+
+/// Where a port's values come from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub(crate) enum Source {
+    /// Position in [`KernelPass::reads`].
+    Read(usize),
+    /// An earlier stage of the pass.
+    Stage(usize),
+}
+
+/// An input port of a stage.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct StagePort {
+    pub(crate) name: String,
+    pub(crate) source: Source,
+    pub(crate) shape: Shape,
+    pub(crate) reach: Reach,
+    pub(crate) border: Border,
+    pub(crate) filter: Filter,
+}
+
+/// One shader instance.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Stage {
+    pub(crate) shader: Shader,
+    pub(crate) entry: Entry,
+    pub(crate) constants: IndexMap<String, Constant>,
+    pub(crate) params: IndexMap<String, Value>,
+    pub(crate) ports: Vec<StagePort>,
+    /// The shape of its result; of its first output when it stores by itself.
+    pub(crate) shape: Shape,
+}
+
+/// An output of a pass.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct PassWrite {
+    /// The stage whose value it is, or which stores it.
+    pub(crate) stage: usize,
+    pub(crate) port: String,
+    pub(crate) resource: ResourceId,
+    pub(crate) access: Access,
+    pub(crate) in_place_of: Option<ResourceId>,
+}
+
+/// One launch to be.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct KernelPass {
+    pub(crate) name: String,
+    pub(crate) nodes: Vec<NodeLabel>,
+    pub(crate) stages: Vec<Stage>,
+    /// Distinct resources that are loaded by ports.
+    pub(crate) reads: Vec<ResourceId>,
+    pub(crate) writes: Vec<PassWrite>,
+    pub(crate) grid: Grid,
+}
+
+impl KernelPass {
+    fn new(pass: &Pass, graph: &PassGraph) -> Self {
+        let mut reads = Vec::new();
+        let port = |read: &pipe_graph::pass::Read, reads: &mut Vec<ResourceId>| {
+            let at = reads.iter().position(|r| *r == read.resource).unwrap_or_else(|| {
+                reads.push(read.resource);
+                reads.len() - 1
+            });
+            StagePort {
+                name: read.port.clone(),
+                source: Source::Read(at),
+                shape: graph.resource(read.resource).shape,
+                reach: read.reach,
+                border: read.border,
+                filter: read.filter,
+            }
+        };
+        let ports = pass.reads.iter().map(|r| port(r, &mut reads)).collect();
+        let stage = Stage {
+            shader: pass.shader.clone(),
+            entry: pass.entry,
+            constants: pass.constants.clone(),
+            params: pass.params.clone(),
+            ports,
+            shape: graph.resource(pass.writes[0].resource).shape,
+        };
+        let write = |w: &pipe_graph::pass::Write| PassWrite {
+            stage: 0,
+            port: w.port.clone(),
+            resource: w.resource,
+            access: w.access,
+            in_place_of: w.in_place_of,
+        };
+        Self {
+            name: pass.name.clone(),
+            nodes: vec![pass.node],
+            stages: vec![stage],
+            reads,
+            writes: pass.writes.iter().map(write).collect(),
+            grid: pass.grid,
+        }
+    }
+
+    /// The stage that gives the pass its entry.
+    pub(crate) fn last(&self) -> &Stage {
+        self.stages.last().expect("a pass has a stage")
+    }
+
+    /// Scalars that drive parameters.
+    pub(crate) fn drivers(&self) -> impl Iterator<Item = ResourceId> + '_ {
+        self.stages.iter().flat_map(|s| s.params.values()).filter_map(|v| match v {
+            Value::Driven(r) => Some(*r),
+            _ => None,
+        })
+    }
+
+    /// Every resource whose content it needs.
+    pub(crate) fn sources(&self) -> impl Iterator<Item = ResourceId> + '_ {
+        self.reads.iter().copied().chain(self.drivers()).chain(self.writes.iter().filter_map(|w| w.in_place_of))
+    }
+}
+
+/// A loop over passes.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct LoopOp {
+    pub(crate) name: String,
+    pub(crate) node: NodeLabel,
+    pub(crate) states: Vec<State>,
+    pub(crate) body: Vec<Op>,
+    pub(crate) count: Count,
+}
+
+/// A pass or a loop.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) enum Op {
+    Pass(KernelPass),
+    Loop(LoopOp),
+}
+
+impl Op {
+    /// Resources from outside that it needs.
+    pub(crate) fn sources(&self) -> Vec<ResourceId> {
+        match self {
+            Self::Pass(pass) => pass.sources().collect(),
+            Self::Loop(l) => {
+                let mut inside = Vec::new();
+                let mut needs: Vec<ResourceId> = l.states.iter().map(|s| s.init).collect();
+                for op in &l.body {
+                    needs.extend(op.sources());
+                    inside.extend(op.results());
+                }
+                needs.extend(l.states.iter().map(|s| s.next));
+                inside.extend(l.states.iter().map(|s| s.carried));
+                needs.retain(|r| !inside.contains(r));
+                needs.sort_unstable();
+                needs.dedup();
+                needs
+            }
+        }
+    }
+
+    /// Resources that later operations may read.
+    pub(crate) fn results(&self) -> Vec<ResourceId> {
+        match self {
+            Self::Pass(pass) => pass.writes.iter().map(|w| w.resource).collect(),
+            Self::Loop(l) => l.states.iter().map(|s| s.result).collect(),
+        }
+    }
+}
+
+/// A pass graph whose passes may be fused.
+#[derive(Debug, Clone)]
+pub(crate) struct Ops {
+    pub(crate) resources: Vec<Resource>,
+    pub(crate) nodes: Vec<String>,
+    pub(crate) ops: Vec<Op>,
+    pub(crate) fetches: Vec<pipe_graph::pass::Fetch>,
+    pub(crate) kept: Vec<(String, ResourceId)>,
+}
+
+impl Ops {
+    /// One stage a pass.
+    pub(crate) fn new(graph: PassGraph) -> Self {
+        fn convert(items: &[Item], graph: &PassGraph) -> Vec<Op> {
+            let one = |item: &Item| match item {
+                Item::Pass(pass) => Op::Pass(KernelPass::new(pass, graph)),
+                Item::Loop(l) => Op::Loop(LoopOp {
+                    name: l.name.clone(),
+                    node: l.node,
+                    states: l.states.clone(),
+                    body: convert(&l.body, graph),
+                    count: l.count.clone(),
+                }),
+            };
+            items.iter().map(one).collect()
+        }
+        let ops = convert(&graph.items, &graph);
+        Self { resources: graph.resources, nodes: graph.nodes, ops, fetches: graph.fetches, kept: graph.kept }
+    }
+
+    pub(crate) fn shape(&self, id: ResourceId) -> Shape {
+        self.resources[id.index()].shape
+    }
+
+    /// Resources that must be there when everything has run.
+    pub(crate) fn wanted(&self) -> impl Iterator<Item = ResourceId> + '_ {
+        let fetched = self.fetches.iter().flat_map(|f| f.parts.iter().map(|(r, _)| *r));
+        fetched.chain(self.kept.iter().map(|(_, r)| *r))
+    }
+}

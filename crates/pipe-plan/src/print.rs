@@ -1,0 +1,227 @@
+//! The plan as text, JSON, DOT and SVG: the same bytes on every machine.
+
+use std::fmt::Write as _;
+
+use pipe_graph::types::{ImageType, Precision, VolumeType};
+use serde_json::{Value, json};
+
+use crate::plan::{Plan, Repeat, Run, Step, Storage, Times};
+
+/// One launch with the loops around it.
+struct Line<'p> {
+    run: &'p Run,
+    loops: Vec<&'p Repeat>,
+}
+
+impl Storage {
+    /// `rgba32float`, `buffer`
+    pub fn format(&self) -> String {
+        match self {
+            Self::Image(ImageType { channels, precision, .. }) | Self::Volume(VolumeType { channels, precision, .. }) => {
+                let names = ["", "r", "rg", "", "rgba"];
+                let bits = if *precision == Precision::F16 { 16 } else { 32 };
+                format!("{}{bits}float", names[*channels as usize])
+            }
+            Self::Buffer { .. } => "buffer".to_owned(),
+        }
+    }
+
+    /// `[w, h]`, `[w, h, d]` or `[bytes]`.
+    pub fn extent(&self) -> Vec<u64> {
+        match self {
+            Self::Image(t) => t.size.iter().map(|n| u64::from(*n)).collect(),
+            Self::Volume(t) => t.size.iter().map(|n| u64::from(*n)).collect(),
+            Self::Buffer { bytes } => vec![*bytes],
+        }
+    }
+}
+
+impl Plan {
+    fn lines(&self) -> Vec<Line<'_>> {
+        fn walk<'p>(steps: &'p [Step], loops: &mut Vec<&'p Repeat>, lines: &mut Vec<Line<'p>>) {
+            for step in steps {
+                match step {
+                    Step::Run(run) => lines.push(Line { run, loops: loops.clone() }),
+                    Step::Repeat(r) => {
+                        loops.push(r);
+                        // The other two copies of the body do the same over other slots.
+                        walk(&r.first, loops, lines);
+                        loops.pop();
+                    }
+                }
+            }
+        }
+        let mut lines = Vec::new();
+        walk(&self.steps, &mut Vec::new(), &mut lines);
+        lines
+    }
+
+    /// The number of launches, each loop's body counted once.
+    pub fn pass_count(&self) -> usize {
+        self.lines().len()
+    }
+
+    /// The size of the first image, or of the first slot.
+    pub fn size(&self) -> Vec<u64> {
+        let image = self.slots.iter().find(|s| matches!(s.storage, Storage::Image(_)));
+        image.or(self.slots.first()).map(|s| s.storage.extent()).unwrap_or_default()
+    }
+
+    /// A table for people.
+    pub fn to_text(&self) -> String {
+        let mut out = format!("plan of {}\n\npasses\n", self.name);
+        for (i, line) in self.lines().iter().enumerate() {
+            let run = line.run;
+            let indent = "  ".repeat(line.loops.len());
+            let times: String = line.loops.last().map(|r| format!("  [{}: {}]", r.name, describe(&r.count))).unwrap_or_default();
+            let _ = writeln!(
+                out,
+                "{:>4}  {indent}{}  ({})  {} -> {}  slots {}  groups {}x{}x{}  {}{times}",
+                i + 1,
+                run.name,
+                self.kernels[run.kernel.0 as usize].label,
+                run.reads.join(", "),
+                run.writes.join(", "),
+                run.slots.iter().map(|s| s.0.to_string()).collect::<Vec<_>>().join(","),
+                run.groups[0],
+                run.groups[1],
+                run.groups[2],
+                bytes(run.bytes),
+            );
+        }
+        out.push_str("\nslots\n");
+        for (i, slot) in self.slots.iter().enumerate() {
+            let extent: Vec<String> = slot.storage.extent().iter().map(u64::to_string).collect();
+            let _ = writeln!(out, "{i:>4}  {:<12} {:>16}  {:>10}", slot.storage.format(), extent.join("x"), bytes(slot.storage.bytes()));
+        }
+        let _ = writeln!(
+            out,
+            "\npeak {}  without sharing {}  moved {}",
+            bytes(self.peak_bytes),
+            bytes(self.naive_bytes),
+            bytes(self.bytes_moved)
+        );
+        out
+    }
+
+    /// `{graph, size, passes, slots, peak_bytes, naive_bytes, bytes_moved}`; keys as fixed in the design.
+    pub fn to_json(&self) -> Value {
+        let pass = |line: &Line<'_>| {
+            let run = line.run;
+            let mut pass = json!({
+                "name": run.name,
+                "nodes": run.nodes,
+                "reads": run.reads,
+                "writes": run.writes,
+                "slot": run.slots.iter().map(|s| s.0).collect::<Vec<_>>(),
+                "grid": run.groups,
+            });
+            if let (Some(r), Some(object)) = (line.loops.last(), pass.as_object_mut()) {
+                object.insert("loop".into(), json!(r.name));
+                object.insert("times".into(), json!(describe(&r.count)));
+            }
+            pass
+        };
+        let slot = |(id, s): (usize, &crate::plan::Slot)| {
+            json!({"id": id, "format": s.storage.format(), "size": s.storage.extent(), "bytes": s.storage.bytes()})
+        };
+        json!({
+            "graph": self.name,
+            "size": self.size(),
+            "passes": self.lines().iter().map(pass).collect::<Vec<_>>(),
+            "slots": self.slots.iter().enumerate().map(slot).collect::<Vec<_>>(),
+            "peak_bytes": self.peak_bytes,
+            "naive_bytes": self.naive_bytes,
+            "bytes_moved": self.bytes_moved,
+        })
+    }
+
+    /// Passes and the resources between them, for Graphviz.
+    pub fn to_dot(&self) -> String {
+        let mut out = format!("digraph {:?} {{\n  rankdir=LR;\n  node [fontname=\"sans-serif\"];\n", self.name);
+        let mut resources: Vec<&str> = Vec::new();
+        for (i, line) in self.lines().iter().enumerate() {
+            let _ = writeln!(out, "  p{i} [shape=box, label={:?}];", line.run.name);
+            for (names, reads) in [(&line.run.reads, true), (&line.run.writes, false)] {
+                for name in names {
+                    let id = resources.iter().position(|r| r == name).unwrap_or_else(|| {
+                        resources.push(name);
+                        resources.len() - 1
+                    });
+                    let _ = if reads { writeln!(out, "  r{id} -> p{i};") } else { writeln!(out, "  p{i} -> r{id};") };
+                }
+            }
+        }
+        for (id, name) in resources.iter().enumerate() {
+            let _ = writeln!(out, "  r{id} [shape=ellipse, label={name:?}];");
+        }
+        out.push_str("}\n");
+        out
+    }
+
+    /// Passes from left to right, a row for each slot, a bar where the slot is written or read.
+    pub fn to_svg(&self) -> String {
+        const STEP: usize = 36;
+        const ROW: usize = 22;
+        const LEFT: usize = 220;
+        let lines = self.lines();
+        let (width, height) = (LEFT + STEP * lines.len().max(1) + 20, ROW * self.slots.len() + 170);
+        let mut out = format!(
+            "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{width}\" height=\"{height}\" font-family=\"sans-serif\" font-size=\"11\">\n\
+             <rect width=\"100%\" height=\"100%\" fill=\"white\"/>\n<text x=\"10\" y=\"16\">{}: peak {}, without sharing {}</text>\n",
+            escape(&self.name),
+            bytes(self.peak_bytes),
+            bytes(self.naive_bytes)
+        );
+        for (i, line) in lines.iter().enumerate() {
+            let x = LEFT + i * STEP + STEP / 2;
+            let _ = writeln!(out, "<text transform=\"translate({x},140) rotate(-60)\">{}</text>", escape(&line.run.name));
+        }
+        for (s, slot) in self.slots.iter().enumerate() {
+            let y = 150 + s * ROW;
+            let extent: Vec<String> = slot.storage.extent().iter().map(u64::to_string).collect();
+            let _ = writeln!(
+                out,
+                "<text x=\"10\" y=\"{}\">{s}: {} {} ({})</text>",
+                y + 14,
+                slot.storage.format(),
+                extent.join("x"),
+                bytes(slot.storage.bytes())
+            );
+            let uses: Vec<usize> = lines.iter().enumerate().filter(|(_, l)| l.run.slots.iter().any(|id| id.0 as usize == s)).map(|(i, _)| i).collect();
+            if let (Some(first), Some(last)) = (uses.first(), uses.last()) {
+                let x = LEFT + first * STEP;
+                let _ = writeln!(
+                    out,
+                    "<rect x=\"{x}\" y=\"{y}\" width=\"{}\" height=\"{}\" fill=\"#9ecae1\"/>",
+                    (last - first + 1) * STEP,
+                    ROW - 4
+                );
+                for i in &uses {
+                    let _ = writeln!(out, "<rect x=\"{}\" y=\"{y}\" width=\"{STEP}\" height=\"{}\" fill=\"#3182bd\" fill-opacity=\"0.6\"/>", LEFT + i * STEP, ROW - 4);
+                }
+            }
+        }
+        out.push_str("</svg>\n");
+        out
+    }
+}
+
+fn describe(times: &Times) -> String {
+    match times {
+        Times::Fixed(n) => format!("{n}"),
+        Times::Until { limit, every, max, .. } => format!("until below {limit}, every {every}, at most {max}"),
+    }
+}
+
+fn bytes(n: u64) -> String {
+    match n {
+        0..1024 => format!("{n} B"),
+        1024..1_048_576 => format!("{:.1} KiB", n as f64 / 1024.0),
+        _ => format!("{:.1} MiB", n as f64 / 1_048_576.0),
+    }
+}
+
+fn escape(text: &str) -> String {
+    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;")
+}
