@@ -1,0 +1,3 @@
+fn apply(b: vec4f) -> vec4f {
+    return vec4f(operation(vec4f(params.number), b).rgb, b.a);
+}

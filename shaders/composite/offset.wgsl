@@ -1,0 +1,3 @@
+fn at(xy: vec2i) -> vec4f {
+    return load_image(xy - params.offset);
+}
