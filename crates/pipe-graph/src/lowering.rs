@@ -122,6 +122,11 @@ impl<'a> Lowering<'a> {
         self.border
     }
 
+    /// `options.filter` of this node, for shaders that interpolate by themselves.
+    pub fn filter(&self) -> Filter {
+        self.filter
+    }
+
     /// The type that arrives at an edge.
     pub fn ty(&self, edge: EdgeIndex) -> EdgeType {
         self.types[edge.0 as usize]
