@@ -30,6 +30,9 @@ fn decode(x: i32, row: i32) -> vec4f {
     if CHANNELS >= 3 {
         rgb = vec3f(rgb.x, stored(1, p), stored(2, p));
     }
+    if CHANNELS == 2 && !HAS_ALPHA {
+        return vec4f(rgb.x, stored(1, p), 0.0, 1.0);
+    }
     var alpha = 1.0;
     if HAS_ALPHA {
         alpha = stored(CHANNELS - 1, p);

@@ -1,1 +1,4 @@
-//! Golden and end-to-end tests of pipe.
+//! What the tests share: a device, small inputs, and a graph run both on the GPU and in double precision.
+
+pub mod bench;
+pub mod source;

@@ -235,6 +235,13 @@ impl<'a> Lowering<'a> {
         self.graph.add(Resource { name, shape: Shape::uints(values.len() as u32), origin: Origin::Literal(bytes) })
     }
 
+    /// A scalar known now.
+    pub fn scalar(&mut self, name: &str, value: [f32; 4]) -> ResourceId {
+        let bytes: Arc<[u8]> = value.iter().flat_map(|v| v.to_le_bytes()).collect();
+        let name = format!("{}.{name}", self.name);
+        self.graph.add(Resource { name, shape: Shape::Scalar, origin: Origin::Literal(bytes) })
+    }
+
     /// Starts a pass; `suffix` may be empty for a node of one pass.
     pub fn pass(&mut self, suffix: &str, shader: Shader) -> PassBuilder<'_, 'a> {
         let name = if suffix.is_empty() { self.name.to_owned() } else { format!("{}.{suffix}", self.name) };

@@ -2,7 +2,11 @@
 //!
 //! Values are plain arrays; nothing is tiled, fused or clever, so that the code can be read beside the formula.
 
+use std::collections::HashMap;
+
 use crate::field::{Accepts, Driven, Image, In, Mesh, Scalar, Table, Volume};
+use crate::graph::{Graph, Times, ValueRef, Work};
+use crate::node::FileSource;
 use crate::pass::Border;
 
 /// An image in double precision. A pixel always has four components: grey (v, v, v, 1), a pair (u, v, 0, 1).
@@ -218,4 +222,69 @@ impl<'a> Reference<'a> {
             Driven::Scalar(port) => self.scalar(port)[0],
         }
     }
+}
+
+/// Computes a whole graph in double precision. `input` gives graph inputs by name and files by
+/// [`FileSource`](crate::node::FileSource) path.
+///
+/// Iterations run as they are written; `Feedback` has its initial value.
+pub fn evaluate(graph: &Graph, input: &dyn Fn(&str) -> Tensor) -> HashMap<ValueRef, Tensor> {
+    region(graph, input, &|_, _| unreachable!("states stand in bodies only"))
+}
+
+fn region(graph: &Graph, input: &dyn Fn(&str) -> Tensor, given: &dyn Fn(bool, usize) -> Tensor) -> HashMap<ValueRef, Tensor> {
+    let mut values: HashMap<ValueRef, Tensor> = HashMap::new();
+    for (node, instance) in graph.iter() {
+        let out = match &instance.work {
+            Work::Input => vec![input(&instance.name)],
+            Work::State(n) => vec![given(true, *n)],
+            Work::Capture(n) => vec![given(false, *n)],
+            Work::Feedback { .. } => vec![values[&instance.inputs[0]].clone()],
+            Work::Node(work) => {
+                let file = work.file().map(|f| match f {
+                    FileSource::Image(path) | FileSource::Volume(path) => input(&path),
+                });
+                let mut inputs: Vec<Tensor> = instance.inputs.iter().map(|v| values[v].clone()).collect();
+                let mut out = Vec::new();
+                for _ in 0..instance.options.repeat.unwrap_or(1) {
+                    if let Some(last) = out.first() {
+                        inputs[0] = Tensor::clone(last);
+                    }
+                    out = work.reference(&Reference {
+                        inputs: &inputs.iter().collect::<Vec<_>>(),
+                        file: file.as_ref(),
+                        border: instance.options.border,
+                        filter: instance.options.filter,
+                        seed: 0,
+                    });
+                }
+                out
+            }
+            Work::Iterate(iteration) => {
+                let states = instance.outputs.len();
+                let mut state: Vec<Tensor> = instance.inputs[..states].iter().map(|v| values[v].clone()).collect();
+                let (times, until) = match iteration.times {
+                    Times::Fixed(n) => (n, None),
+                    Times::Until { value, limit, every, max } => (max, Some((value, limit, every))),
+                };
+                for i in 0..times {
+                    let inside = region(&iteration.body, input, &|is_state, n| {
+                        if is_state { state[n].clone() } else { values[&instance.inputs[states + n]].clone() }
+                    });
+                    state = iteration.next.iter().map(|v| inside[v].clone()).collect();
+                    if let Some((value, limit, every)) = until
+                        && (i + 1) % every == 0
+                        && matches!(&inside[&value], Tensor::Scalar(s) if s[0] < f64::from(limit))
+                    {
+                        break;
+                    }
+                }
+                state
+            }
+        };
+        for (port, value) in out.into_iter().enumerate() {
+            values.insert(ValueRef { node, port }, value);
+        }
+    }
+    values
 }

@@ -19,7 +19,7 @@ const MOST_SETS: usize = 4096;
 ///
 /// **Invariant**: every operation stands after those whose results it reads.
 #[derive(Debug, Clone)]
-pub struct Schedule {
+pub(crate) struct Schedule {
     pub(crate) ops: Ops,
 }
 

@@ -43,7 +43,7 @@ pub enum Layout {
     Planar,
 }
 
-/// What the channels are. With one channel the image is grey; with two it is grey and alpha.
+/// What alpha means.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize)]
 pub enum Alpha {
     /// There is none: 1 on the way in, dropped on the way out.
@@ -70,7 +70,7 @@ pub enum Transfer {
 pub struct PixelForm {
     /// Width and height.
     pub size: [u32; 2],
-    /// 1 (Y), 2 (Y and alpha), 3 (RGB) or 4 (RGBA).
+    /// 1 (Y), 2 (Y and alpha; without alpha a pair of fields), 3 (RGB) or 4 (RGBA).
     pub channels: u8,
     /// Sample type.
     pub sample: Sample,
@@ -93,7 +93,7 @@ impl PixelForm {
             channels,
             sample: Sample::F32,
             layout: Layout::Interleaved,
-            alpha: if channels == 2 || channels == 4 { Alpha::Associated } else { Alpha::None },
+            alpha: if channels == 4 { Alpha::Associated } else { Alpha::None },
             transfer: Transfer::Linear,
             matrix: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]],
         }
@@ -109,8 +109,12 @@ impl PixelForm {
         self.bytes().div_ceil(4)
     }
 
-    /// Channels of the image inside the graph: 1 for grey without alpha, 4 otherwise.
+    /// Channels of the image inside the graph: 1 for grey, 2 for a pair of fields, 4 otherwise.
     pub const fn image_channels(&self) -> u8 {
-        if self.channels == 1 { 1 } else { 4 }
+        match (self.channels, self.alpha) {
+            (1, _) => 1,
+            (2, Alpha::None) => 2,
+            _ => 4,
+        }
     }
 }

@@ -124,7 +124,7 @@ pub fn fetch_image(cx: &mut Lowering<'_>, name: &str, image: ResourceId, form: &
         let outs: Vec<ResourceId> = band.planes.iter().map(|range| cx.intermediate("file", words(range))).collect();
         let cases: String = (1..outs.len()).map(|c| format!("    if c == {c} {{ store_c{c}(i, v); return; }}\n")).collect();
         let put = format!("fn put(c: i32, i: i32, v: u32) {{\n{cases}    store_c0(i, v);\n}}\n");
-        let grey = form.channels <= 2 && cx.image_of(image).channels == 4;
+        let grey = (form.channels == 1 || form.alpha != Alpha::None && form.channels == 2) && cx.image_of(image).channels == 4;
         let groups = (u64::from(form.size[0]) * u64::from(rows)).div_ceil(4 / form.sample.bytes());
         let pass = cx.pass("encode", shader!("io/pack", put)).entry(Entry::Each);
         let mut pass = describe(pass, form)

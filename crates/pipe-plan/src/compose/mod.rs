@@ -104,11 +104,15 @@ impl<'a> Composer<'a> {
             resources.push(*id);
             let _ = writeln!(io, "@group(0) @binding({at}) var<storage, read> d{i}: vec4f;");
         }
+        if pass.last().entry == Entry::Points {
+            // Behind the bindings: the image that is drawn into.
+            resources.push(pass.writes[0].resource);
+        }
         io.push_str("var<private> current: vec2i;\n");
 
+        // The target of points is not bound and never asked for.
         let index = |id: ResourceId, write: bool| {
-            let found = bound.iter().position(|b| b.resource == id && (b.use_ != Use::Read) == write);
-            found.expect("everything that a pass names is bound")
+            bound.iter().position(|b| b.resource == id && (b.use_ != Use::Read) == write).unwrap_or(usize::MAX)
         };
         let mut modules = vec![("io".to_owned(), io)];
         let main = pass.stages.len() - 1;
@@ -127,7 +131,7 @@ impl<'a> Composer<'a> {
                 };
                 ports::read_port(&mut text, port, raw);
             }
-            for write in pass.writes.iter().filter(|w| w.stage == s) {
+            for write in pass.writes.iter().filter(|w| w.stage == s && stage.entry != Entry::Points) {
                 let i = index(write.resource, true);
                 ports::write_port(&mut text, &write.port, i, self.ops.shape(write.resource), write.access);
             }

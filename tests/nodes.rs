@@ -1,0 +1,101 @@
+//! The free tests of every node: each of its examples, on the GPU against its twin in double precision, at awkward
+//! sizes and with every border.
+//!
+//! `cargo test -p pipe-tests --test nodes -- Blur` runs those whose name contains `Blur`.
+
+use pipe_graph::node::Kind;
+use pipe_graph::types::EdgeType;
+use pipe_tests::bench::{Bench, compile, reference};
+use pipe_tests::source::{edge, edge_type};
+
+const SIZES: [[u32; 2]; 5] = [[61, 47], [1, 1], [1, 33], [70, 1], [257, 129]];
+const BORDERS: [&str; 4] = ["Clamp", "Mirror", "Repeat", "Black"];
+const EDGES: [&str; 8] = ["in", "other", "grey", "pair", "table", "curve", "volume", "fog"];
+
+fn main() {
+    let filter: Vec<String> = std::env::args().skip(1).filter(|a| !a.starts_with('-')).collect();
+    let mut bench = Bench::new();
+    let (mut passed, mut failed) = (0, Vec::new());
+    for kind in pipe_nodes::REGISTRY.iter() {
+        for (number, example) in kind.examples.iter().enumerate() {
+            let name = format!("{}::example_{number}", kind.name);
+            if !filter.is_empty() && !filter.iter().any(|f| name.contains(f.as_str())) {
+                continue;
+            }
+            match every_variant(&mut bench, kind, example) {
+                Ok(()) => {
+                    passed += 1;
+                    println!("test {name} ... ok");
+                }
+                Err(message) => {
+                    println!("test {name} ... FAILED\n    {example}\n    {}", message.replace('\n', "\n    "));
+                    failed.push(name);
+                }
+            }
+        }
+    }
+    println!("\ntest result: {}. {passed} passed; {} failed; 0 ignored; 0 measured; 0 filtered out", if failed.is_empty() { "ok" } else { "FAILED" }, failed.len());
+    if !failed.is_empty() {
+        std::process::exit(101);
+    }
+}
+
+/// The graph of one example: `{options}` is put behind its fields.
+fn graph_text(kind: &Kind, example: &str, options: &str, ports: &[String]) -> String {
+    let inputs: String = named(example).map(|n| {
+        let ty = match edge_type(n, [1, 1]) {
+            EdgeType::Table(_) => "Table",
+            EdgeType::Volume(_) => "Volume",
+            _ => "Image",
+        };
+        format!("\"{n}\": {ty}, ")
+    }).collect();
+    let scalar = if example.contains("\"scalar\"") { "\"scalar\": ScalarSource()," } else { "" };
+    let end = example.rfind(')').expect("an example is a call");
+    let comma = if example[..end].trim_end().ends_with('(') { "" } else { ", " };
+    let call = format!("{}{comma}options: ({options})){}", &example[..end], &example[end + 1..]);
+    let outputs: String = ports.iter().map(|p| format!("\"{p}\": \"node.{p}\", ")).collect();
+    let _ = kind;
+    format!("Graph(version: 1, inputs: {{{inputs}}}, nodes: {{{scalar} \"node\": {call}}}, outputs: {{{outputs}}})")
+}
+
+/// The test inputs that an example names, as edges or in expressions.
+fn named(example: &str) -> impl Iterator<Item = &'static str> + '_ {
+    EDGES.into_iter().filter(|n| example.contains(&format!("\"{n}\"")) || example.contains(&format!("={n}.")))
+}
+
+fn every_variant(bench: &mut Bench, kind: &Kind, example: &str) -> Result<(), String> {
+    for size in SIZES {
+        one(bench, kind, example, size, "")?;
+    }
+    for border in BORDERS {
+        one(bench, kind, example, [61, 47], &format!("border: {border}"))?;
+    }
+    Ok(())
+}
+
+fn one(bench: &mut Bench, kind: &Kind, example: &str, size: [u32; 2], options: &str) -> Result<(), String> {
+    let types: Vec<(&str, EdgeType)> = named(example).map(|n| (n, edge_type(n, size))).collect();
+    let ports: Vec<String> = kind.ports.iter().map(|p| p.0.to_owned()).collect();
+    let text = graph_text(kind, example, options, &ports);
+    let graph = compile(&text, &types).map_err(|e| format!("{text}\n{e}"))?;
+    let input = |name: &str| edge(name, size);
+    let got = bench.gpu(&graph, &input)?;
+    let expected = reference(&graph, &input);
+    for port in &ports {
+        let (Some(got), Some(expected)) = (got.get(port), expected.get(port)) else {
+            return Err(format!("port `{port}` is missing at {size:?}"));
+        };
+        if got.len() != expected.len() {
+            return Err(format!("port `{port}` has {} values, expected {} at {size:?}", got.len(), expected.len()));
+        }
+        for (i, (g, e)) in got.iter().zip(expected).enumerate() {
+            let bound = kind.tolerance.absolute + kind.tolerance.relative * e.abs();
+            let fits = (g - e).abs() <= bound || (g.is_nan() && e.is_nan()) || g == e;
+            if !fits {
+                return Err(format!("`{port}`[{i}] is {g}, expected {e} (off by {:.3e}, allowed {bound:.3e}) at {size:?} {options}", (g - e).abs()));
+            }
+        }
+    }
+    Ok(())
+}
