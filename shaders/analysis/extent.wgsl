@@ -2,7 +2,7 @@
 // as there are partials. Constants: the walk (LANES, TILE, SERIAL), VIEW (0 channels, 1 luminance, 2 colour and
 // luminance).
 
-import package::lib::wide::exact_luminance;
+import package::lib::wide::viewed;
 
 const LARGEST = 3.4028234663852886e38;
 
@@ -10,16 +10,6 @@ var<workgroup> low: array<vec4f, LANES_X * LANES_Y>;
 var<workgroup> high: array<vec4f, LANES_X * LANES_Y>;
 var<workgroup> nans: array<vec4f, LANES_X * LANES_Y>;
 var<workgroup> infs: array<vec4f, LANES_X * LANES_Y>;
-
-fn seen(c: vec4f) -> vec4f {
-    if VIEW == 1 {
-        return vec4f(exact_luminance(c.rgb));
-    }
-    if VIEW == 2 {
-        return vec4f(c.rgb, exact_luminance(c.rgb));
-    }
-    return c;
-}
 
 fn leave(index: i32, a: vec4f, b: vec4f, nan: vec4f, inf: vec4f) {
     let n = size_partials() / 16;
@@ -46,7 +36,7 @@ fn main(
     var inf = vec4f();
     for (var y = first.y + i32(local.y); y < last.y; y += LANES_Y) {
         for (var x = first.x + i32(local.x); x < last.x; x += LANES_X) {
-            let v = seen(load_image(vec2i(x, y)));
+            let v = viewed(load_image(vec2i(x, y)), VIEW);
             let magnitude = bitcast<vec4u>(v) & vec4u(0x7fffffffu);
             let finite = magnitude < vec4u(0x7f800000u);
             a = select(a, min(a, v), finite);

@@ -9,7 +9,7 @@ var<workgroup> high: array<vec4f, LANES>;
 var<workgroup> nans: array<vec4f, LANES>;
 var<workgroup> infs: array<vec4f, LANES>;
 
-fn partial(part: i32, index: i32, n: i32) -> vec4f {
+fn run_of(part: i32, index: i32, n: i32) -> vec4f {
     let first = part * 4 * n + index;
     return vec4f(load_partials(first), load_partials(first + n), load_partials(first + 2 * n), load_partials(first + 3 * n));
 }
@@ -22,10 +22,10 @@ fn main(@builtin(local_invocation_index) lane: u32) {
     var nan = vec4f();
     var inf = vec4f();
     for (var i = i32(lane); i < n; i += i32(LANES)) {
-        a = min(a, partial(0, i, n));
-        b = max(b, partial(1, i, n));
-        nan += partial(2, i, n);
-        inf += partial(3, i, n);
+        a = min(a, run_of(0, i, n));
+        b = max(b, run_of(1, i, n));
+        nan += run_of(2, i, n);
+        inf += run_of(3, i, n);
     }
     low[lane] = a;
     high[lane] = b;

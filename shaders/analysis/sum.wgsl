@@ -4,21 +4,11 @@
 // (LANES, TILE, SERIAL), VIEW (0 channels, 1 luminance, 2 colour and luminance), MEASURE (0 value, 1 logarithm,
 // 2 squared distance from `centre()`, which stands behind this file).
 
-import package::lib::wide::{exact_luminance, sum_error};
+import package::lib::wide::{sum_error, viewed};
 
 var<workgroup> sums: array<vec4f, LANES_X * LANES_Y>;
 var<workgroup> errors: array<vec4f, LANES_X * LANES_Y>;
 var<workgroup> counts: array<vec4f, LANES_X * LANES_Y>;
-
-fn seen(c: vec4f) -> vec4f {
-    if VIEW == 1 {
-        return vec4f(exact_luminance(c.rgb));
-    }
-    if VIEW == 2 {
-        return vec4f(c.rgb, exact_luminance(c.rgb));
-    }
-    return c;
-}
 
 fn measure(v: vec4f, middle: vec4f) -> vec4f {
     if MEASURE == 1 {
@@ -56,12 +46,11 @@ fn main(
     var count = vec4f();
     for (var y = first.y + i32(local.y); y < last.y; y += LANES_Y) {
         for (var x = first.x + i32(local.x); x < last.x; x += LANES_X) {
-            let v = seen(load_image(vec2i(x, y)));
+            let v = viewed(load_image(vec2i(x, y)), VIEW);
             let finite = (bitcast<vec4u>(v) & vec4u(0x7f800000u)) != vec4u(0x7f800000u);
             let term = select(vec4f(), measure(v, middle), finite);
-            let next = sum + term;
-            error += sum_error(sum, term, next);
-            sum = next;
+            error += sum_error(sum, term);
+            sum += term;
             count += select(vec4f(), vec4f(1.0), finite);
         }
     }
@@ -78,9 +67,8 @@ fn main(
         if lane < half {
             let other = sums[lane + half];
             let mine = sums[lane];
-            let next = mine + other;
-            errors[lane] += errors[lane + half] + sum_error(mine, other, next);
-            sums[lane] = next;
+            errors[lane] += errors[lane + half] + sum_error(mine, other);
+            sums[lane] = mine + other;
             counts[lane] += counts[lane + half];
         }
     }

@@ -9,7 +9,7 @@ var<workgroup> sums: array<vec4f, LANES>;
 var<workgroup> errors: array<vec4f, LANES>;
 var<workgroup> counts: array<vec4f, LANES>;
 
-fn partial(part: i32, index: i32, n: i32) -> vec4f {
+fn run_of(part: i32, index: i32, n: i32) -> vec4f {
     let first = part * 4 * n + index;
     return vec4f(load_partials(first), load_partials(first + n), load_partials(first + 2 * n), load_partials(first + 3 * n));
 }
@@ -35,11 +35,10 @@ fn main(@builtin(local_invocation_index) lane: u32) {
     var error = vec4f();
     var count = vec4f();
     for (var i = i32(lane); i < n; i += i32(LANES)) {
-        let term = partial(0, i, n);
-        let next = sum + term;
-        error += sum_error(sum, term, next) + partial(1, i, n);
-        sum = next;
-        count += partial(2, i, n);
+        let term = run_of(0, i, n);
+        error += sum_error(sum, term) + run_of(1, i, n);
+        sum += term;
+        count += run_of(2, i, n);
     }
     sums[lane] = sum;
     errors[lane] = error;
@@ -49,9 +48,8 @@ fn main(@builtin(local_invocation_index) lane: u32) {
         if lane < half {
             let other = sums[lane + half];
             let mine = sums[lane];
-            let next = mine + other;
-            errors[lane] += errors[lane + half] + sum_error(mine, other, next);
-            sums[lane] = next;
+            errors[lane] += errors[lane + half] + sum_error(mine, other);
+            sums[lane] = mine + other;
             counts[lane] += counts[lane + half];
         }
     }

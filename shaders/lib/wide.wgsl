@@ -4,16 +4,21 @@
 // Shewchuk, Adaptive Precision Floating-Point Arithmetic, 1997. Neither needs a fused multiply-add, which some
 // devices do not have, and neither is spoiled by one.
 
+/// The largest finite float. `min(x, LARGEST_FLOAT)` is x, but no compiler knows: it keeps Mesa and Metal, which may
+/// rearrange sums, from concluding that (a + b) − a is b and that nothing was lost.
+const LARGEST_FLOAT = 3.4028234663852886e38;
+
 /// a + b = x + y exactly, x the rounded sum.
 fn two_sum(a: f32, b: f32) -> vec2f {
-    let s = a + b;
-    let t = s - a;
+    let s = min(a + b, LARGEST_FLOAT);
+    let t = min(s - a, LARGEST_FLOAT);
     return vec2f(s, (a - (s - t)) + (b - t));
 }
 
-/// What rounding loses in s = a + b, component by component.
-fn sum_error(a: vec4f, b: vec4f, s: vec4f) -> vec4f {
-    let t = s - a;
+/// What rounding loses in a + b, component by component.
+fn sum_error(a: vec4f, b: vec4f) -> vec4f {
+    let s = min(a + b, vec4f(LARGEST_FLOAT));
+    let t = min(s - a, vec4f(LARGEST_FLOAT));
     return (a - (s - t)) + (b - t);
 }
 
@@ -45,10 +50,9 @@ fn wide_multiply(p: vec2f, q: vec2f) -> vec2f {
     return two_sum(r.x, r.y + (p.x * q.y + p.y * q.x));
 }
 
-/// Whether p < q.
+/// Whether p < q. Pairs made here are normalised, so their first parts decide unless they are equal.
 fn wide_less(p: vec2f, q: vec2f) -> bool {
-    let d = two_sum(p.x, -q.x);
-    return d.x + (d.y + (p.y - q.y)) < 0.0;
+    return p.x < q.x || (p.x == q.x && p.y < q.y);
 }
 
 /// Y = 0.2126 R + 0.7152 G + 0.0722 B to about 45 bits; exactly the value of a grey pixel.
@@ -61,15 +65,26 @@ fn wide_luminance(c: vec3f) -> vec2f {
         return vec2f(plain, 0.0);
     }
     // The weights as pairs: what 32 bits leave of 0.2126, 0.7152 and 0.0722.
-    let r = wide_scale(vec2f(0.2126, 7.2479249269008506e-09), c.r);
-    let g = wide_scale(vec2f(0.7152, -6.961822673900997e-09), c.g);
-    let b = wide_scale(vec2f(0.0722, -2.861023085110048e-10), c.b);
+    let r = wide_scale(vec2f(0.2126, 7.247925e-9), c.r);
+    let g = wide_scale(vec2f(0.7152, -6.9618227e-9), c.g);
+    let b = wide_scale(vec2f(0.0722, -2.861023e-10), c.b);
     return wide_add(wide_add(r, g), b);
 }
 
 /// Luminance rounded once; exactly the value of a grey pixel.
 fn exact_luminance(c: vec3f) -> f32 {
     return wide_luminance(c).x;
+}
+
+/// What is measured of a pixel. View 0: its channels; 1: its luminance, in every component; 2: its colour and luminance.
+fn viewed(c: vec4f, view: i32) -> vec4f {
+    if view == 1 {
+        return vec4f(exact_luminance(c.rgb));
+    }
+    if view == 2 {
+        return vec4f(c.rgb, exact_luminance(c.rgb));
+    }
+    return c;
 }
 
 /// The bin of v among `bins` equal bins over lo..hi: floor((v − lo)/(hi − lo)·bins) of the true quotient, with hi
@@ -97,6 +112,25 @@ fn bin_index(v: vec2f, lo: f32, hi: f32, bins: i32) -> i32 {
         }
     }
     return k;
+}
+
+/// The bin that a pixel falls in, or −1. Channel 0 is the luminance, 1 to 4 are R, G, B, A. NaN falls in none; what
+/// lies outside lo..hi falls in the first or last bin when `clamped`.
+fn bin_of_pixel(c: vec4f, channel: i32, lo: f32, hi: f32, bins: i32, clamped: bool) -> i32 {
+    var v = vec2f(c.a, 0.0);
+    if channel == 0 {
+        v = wide_luminance(c.rgb);
+    } else if channel < 4 {
+        v = vec2f(c[channel - 1], 0.0);
+    }
+    if (bitcast<u32>(v.x) & 0x7fffffffu) > 0x7f800000u {
+        return -1;
+    }
+    let k = bin_index(v, lo, hi, bins);
+    if clamped {
+        return clamp(k, 0, bins - 1);
+    }
+    return select(k, -1, k == bins);
 }
 
 /// a·b as (low word, high word).

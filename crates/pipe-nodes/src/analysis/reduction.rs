@@ -191,6 +191,11 @@ impl Walk {
         }
     }
 
+    /// Tiles of a size given, for workgroups whose threads share their numbers.
+    pub(crate) const fn tiles(size: [u32; 2], lanes: [u32; 2], tile: [u32; 2]) -> Self {
+        Self { lanes, tile, groups: [size[0].div_ceil(tile[0]), size[1].div_ceil(tile[1])], serial: false }
+    }
+
     /// How many threads or workgroups leave numbers.
     pub(crate) const fn partials(&self) -> u32 {
         let groups = self.groups[0] * self.groups[1];

@@ -1,0 +1,53 @@
+// The sums of every row and of every column of a tile of SIDE×SIDE pixels.
+//
+// Sums of rows lie tile column after tile column, sums of columns tile row after tile row, so that the carrying
+// passes read runs. `Texel` and the writing of tables stand behind this file. Columns of the tile are exchanged
+// with the row's number, so that neither a row nor a column of threads meets in one bank of workgroup memory.
+
+import package::lib::wide::sum_error;
+
+var<workgroup> tile: array<Texel, SIDE * SIDE>;
+
+fn cell(x: i32, y: i32) -> i32 {
+    return y * SIDE + (x ^ y);
+}
+
+@compute @workgroup_size(8, 8, 1)
+fn main(
+    @builtin(workgroup_id) group: vec3u,
+    @builtin(local_invocation_id) local: vec3u,
+    @builtin(local_invocation_index) lane: u32,
+) {
+    let size = size_image();
+    let origin = vec2i(group.xy) * SIDE;
+    for (var y = i32(local.y); y < SIDE; y += 8) {
+        for (var x = i32(local.x); x < SIDE; x += 8) {
+            let xy = origin + vec2i(x, y);
+            var t = Texel();
+            if all(xy < size) {
+                t = texel_of(load_image(xy));
+            }
+            tile[cell(x, y)] = t;
+        }
+    }
+    workgroupBarrier();
+    for (var line = i32(lane); line < 2 * SIDE; line += 64) {
+        let i = line % SIDE;
+        var sum = Texel();
+        if line < SIDE {
+            for (var x = 0; x < SIDE; x++) {
+                sum += tile[cell(x, i)];
+            }
+            if origin.y + i < size.y {
+                put_rows(i32(group.x) * size.y + origin.y + i, sum);
+            }
+        } else {
+            for (var y = 0; y < SIDE; y++) {
+                sum += tile[cell(i, y)];
+            }
+            if origin.x + i < size.x {
+                put_columns(i32(group.y) * size.x + origin.x + i, sum);
+            }
+        }
+    }
+}
