@@ -31,7 +31,7 @@ pub(crate) const KIND: Kind = Kind::of::<Crop>(
     &[
         r#"Crop(image: "in", width: "=ceil(in.width/2)", height: "=ceil(in.height/2)")"#,
         r#"Crop(image: "in", x: "=floor(in.width/3)", y: "=floor(in.height/3)")"#,
-        r#"Crop(image: "grey", x: "=in.width-1", width: 1)"#,
+        r#"Crop(image: "grey", x: "=grey.width-1", width: 1)"#,
     ],
 )
 .tolerance(0.0, 0.0);
