@@ -19,6 +19,7 @@ pub mod span;
 pub mod structure;
 pub mod syntax;
 pub mod types;
+pub mod wgsl;
 
 /// What a node file needs.
 pub mod prelude {
@@ -27,7 +28,7 @@ pub mod prelude {
 
     pub use crate::field::{Any, Array, Driven, Image, ImageOrTable, ImageOrVolume, In, Mesh, Operand, Scalar, Table, Volume};
     pub use crate::lowering::{Carried, Lowering, MeshParts};
-    pub use crate::node::{Category, FileSource, Inputs, Kind, Mistake, Node, Opening, Output, Port, TableFile};
+    pub use crate::node::{Category, FileElement, FileSource, Inputs, Kind, Mistake, Node, Opening, Output, Port, ReadbackFile, TableFile};
     pub use crate::pass::{
         Access, Border, Constant, Count, Entry, Filter, Grid, Profile, Reach, ResourceId, Shader, Shape, Value,
     };

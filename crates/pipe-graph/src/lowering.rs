@@ -107,6 +107,11 @@ impl<'a> Lowering<'a> {
         (self.items, self.emitted)
     }
 
+    /// The node's private name.
+    pub fn name(&self) -> &str {
+        self.name
+    }
+
     /// The device that the plan is for.
     pub fn limits(&self) -> &Limits {
         self.limits

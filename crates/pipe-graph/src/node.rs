@@ -177,6 +177,32 @@ pub enum FileSource {
     Volume(String),
 }
 
+/// The type of the values in a readback file.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize, JsonSchema)]
+#[allow(missing_docs)]
+pub enum FileElement {
+    U8,
+    U16,
+    I32,
+    U32,
+    F16,
+    #[default]
+    F32,
+}
+
+/// A file that a run writes beside the graph's outputs.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ReadbackFile {
+    /// Relative to the working directory; its ending says the format.
+    pub path: String,
+    /// Type of the values, where the format can hold it.
+    pub element: Option<FileElement>,
+    /// Channels of an image, as positions 0..3; all when empty.
+    pub channels: Vec<usize>,
+    /// What is fetched: the size of the region of an image, a table, a scalar.
+    pub ty: EdgeType,
+}
+
 /// One node of a graph with its parameters: a verb of the language.
 ///
 /// Methods are called in this order: [`open`](Node::open), [`outputs`](Node::outputs), then
@@ -192,6 +218,11 @@ pub trait Node: Debug + Send + Sync {
 
     /// The file that this node reads, if it is a file source; the lowering gets it as `cx.file()`.
     fn file(&self) -> Option<FileSource> {
+        None
+    }
+
+    /// The file that a run writes with what this node fetches under its own name, given the types of its inputs.
+    fn readback(&self, _: &[EdgeType]) -> Option<ReadbackFile> {
         None
     }
 
@@ -277,6 +308,22 @@ impl Kind {
     pub const fn ports(mut self, ports: &'static [(&'static str, &'static str)]) -> Self {
         self.ports = ports;
         self
+    }
+
+    /// The entry of a kind that the resolver takes apart: it shapes the graph and never becomes a pass.
+    pub const fn structure<T>(name: &'static str, examples: &'static [&'static str]) -> Self
+    where
+        T: DeserializeOwned + JsonSchema + 'static,
+    {
+        Self {
+            name,
+            category: Category::Structure,
+            ports: &[],
+            examples,
+            tolerance: Tolerance::EXACT,
+            schema: || schema_for!(T),
+            build: |_| Err(serde::de::Error::custom("the resolver takes this kind apart")),
+        }
     }
 
     /// With this tolerance.

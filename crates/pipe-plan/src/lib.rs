@@ -8,7 +8,7 @@
 //! or a device: the same graph, sizes and limits give the same plan, byte for byte.
 
 mod allocate;
-pub mod compose;
+mod compose;
 mod error;
 mod kernel_pass;
 pub mod lower;

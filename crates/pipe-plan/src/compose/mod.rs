@@ -22,13 +22,11 @@ use std::sync::Arc;
 
 use indexmap::IndexMap;
 use pipe_graph::pass::{Access, Entry, Limits, ResourceId, Shape};
+use pipe_graph::wgsl::LIBRARY;
 
 use crate::PlanError;
 use crate::kernel_pass::{KernelPass, Ops, Source};
 use crate::plan::{Binding, Kernel, KernelId, Launch};
-
-/// The shared functions, by module name.
-pub const LIBRARY: &[(&str, &str)] = &include!(concat!(env!("OUT_DIR"), "/library.rs"));
 
 /// What a composed pass binds and launches.
 pub(crate) struct Composed {
