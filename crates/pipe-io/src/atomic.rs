@@ -1,0 +1,175 @@
+//! Files that appear whole or not at all.
+//!
+//! A temporary file in the same folder (so that renaming does not copy), written, synced, then renamed over the target:
+//! an interrupted or failed run leaves the old file untouched. What is no regular file (`/dev/null`, a pipe) cannot be
+//! replaced and is written directly; a symbolic link is followed, so that the link stays and its target changes.
+
+use std::fs::{self, File, OpenOptions, Permissions};
+use std::io::{self, Stdout, Write};
+use std::path::{Path, PathBuf};
+
+use tempfile::NamedTempFile;
+
+/// A file being written. Dropped before [`commit`](Self::commit), it leaves nothing behind.
+#[derive(Debug)]
+pub struct AtomicFile {
+    kind: Kind,
+}
+
+#[derive(Debug)]
+enum Kind {
+    Temporary { file: NamedTempFile, target: PathBuf, permissions: Option<Permissions> },
+    Direct(File),
+    Stdout(Stdout),
+}
+
+impl AtomicFile {
+    /// Begins to write `path`; `None` is the standard output.
+    ///
+    /// Errors: the folder does not exist or may not be written to; `path` is a folder.
+    pub fn create(path: Option<&Path>) -> io::Result<Self> {
+        let Some(path) = path else { return Ok(Self { kind: Kind::Stdout(io::stdout()) }) };
+        let target = follow(path)?;
+        let existing = match fs::metadata(&target) {
+            Ok(metadata) => Some(metadata),
+            Err(error) if error.kind() == io::ErrorKind::NotFound => None,
+            Err(error) => return Err(error),
+        };
+        if let Some(metadata) = &existing {
+            if metadata.is_dir() {
+                return Err(io::Error::new(io::ErrorKind::IsADirectory, "it is a folder"));
+            }
+            if !metadata.is_file() {
+                return Ok(Self { kind: Kind::Direct(OpenOptions::new().write(true).open(&target)?) });
+            }
+            // A file that its owner made read-only is not to be replaced just because its folder allows it.
+            if metadata.permissions().readonly() {
+                return Err(io::Error::new(io::ErrorKind::PermissionDenied, "the file there is read-only"));
+            }
+        }
+        let folder = target.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+        let name = target.file_name().unwrap_or_default().to_string_lossy();
+        let prefix = format!(".{name}.");
+        let mut builder = tempfile::Builder::new();
+        builder.prefix(&prefix).suffix(".tmp");
+        #[cfg(unix)]
+        let everyone = {
+            use std::os::unix::fs::PermissionsExt;
+            // As any new file: the umask takes away what the user does not want.
+            Permissions::from_mode(0o666)
+        };
+        #[cfg(unix)]
+        builder.permissions(everyone);
+        let file = builder.tempfile_in(folder)?;
+        let permissions = existing.map(|metadata| metadata.permissions());
+        Ok(Self { kind: Kind::Temporary { file, target, permissions } })
+    }
+
+    /// Syncs the file and puts it in its place.
+    pub fn commit(self) -> io::Result<()> {
+        match self.kind {
+            Kind::Temporary { mut file, target, permissions } => {
+                file.flush()?;
+                if let Some(permissions) = permissions {
+                    file.as_file().set_permissions(permissions)?;
+                }
+                file.as_file().sync_all()?;
+                file.persist(target).map(drop).map_err(|error| error.error)
+            }
+            Kind::Direct(mut file) => file.flush(),
+            Kind::Stdout(mut stream) => stream.flush(),
+        }
+    }
+
+    /// Writes a whole file at once.
+    pub fn write_whole(path: Option<&Path>, bytes: &[u8]) -> io::Result<()> {
+        let mut file = Self::create(path)?;
+        file.write_all(bytes)?;
+        file.commit()
+    }
+}
+
+impl Write for AtomicFile {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        match &mut self.kind {
+            Kind::Temporary { file, .. } => file.write(bytes),
+            Kind::Direct(file) => file.write(bytes),
+            Kind::Stdout(stream) => stream.write(bytes),
+        }
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        match &mut self.kind {
+            Kind::Temporary { file, .. } => file.flush(),
+            Kind::Direct(file) => file.flush(),
+            Kind::Stdout(stream) => stream.flush(),
+        }
+    }
+}
+
+/// Where a chain of symbolic links ends, whether or not something is there.
+fn follow(path: &Path) -> io::Result<PathBuf> {
+    let mut path = path.to_path_buf();
+    for _ in 0..40 {
+        match fs::read_link(&path) {
+            Ok(link) => path = path.parent().unwrap_or(Path::new("")).join(link),
+            Err(_) => return Ok(path),
+        }
+    }
+    Err(io::Error::other("its symbolic links go in a circle"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn names(folder: &Path) -> Vec<String> {
+        let mut names: Vec<_> =
+            fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().file_name().into_string().unwrap()).collect();
+        names.sort();
+        names
+    }
+
+    #[test]
+    fn only_a_commit_changes_the_target() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.txt");
+        fs::write(&path, "old").unwrap();
+        let mut file = AtomicFile::create(Some(&path)).unwrap();
+        file.write_all(b"half").unwrap();
+        assert!(names(folder.path())[0].starts_with(".a.txt."));
+        drop(file);
+        assert_eq!((names(folder.path()), fs::read(&path).unwrap()), (vec!["a.txt".to_owned()], b"old".to_vec()));
+        AtomicFile::write_whole(Some(&path), b"new").unwrap();
+        assert_eq!((names(folder.path()), fs::read(&path).unwrap()), (vec!["a.txt".to_owned()], b"new".to_vec()));
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn links_and_permissions_stay() {
+        use std::os::unix::fs::{PermissionsExt, symlink};
+        let folder = tempfile::tempdir().unwrap();
+        let (path, link) = (folder.path().join("a"), folder.path().join("b"));
+        fs::write(&path, "old").unwrap();
+        fs::set_permissions(&path, Permissions::from_mode(0o640)).unwrap();
+        symlink("a", &link).unwrap();
+        AtomicFile::write_whole(Some(&link), b"new").unwrap();
+        assert_eq!(fs::read(&path).unwrap(), b"new");
+        assert!(fs::symlink_metadata(&link).unwrap().is_symlink());
+        assert_eq!(fs::metadata(&path).unwrap().permissions().mode() & 0o777, 0o640);
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn devices_are_written_directly() {
+        AtomicFile::write_whole(Some(Path::new("/dev/null")), b"gone").unwrap();
+    }
+
+    #[test]
+    fn folders_are_refused() {
+        let folder = tempfile::tempdir().unwrap();
+        assert_eq!(AtomicFile::create(Some(folder.path())).unwrap_err().kind(), io::ErrorKind::IsADirectory);
+        let missing = folder.path().join("no/file");
+        assert_eq!(AtomicFile::create(Some(&missing)).unwrap_err().kind(), io::ErrorKind::NotFound);
+    }
+}

@@ -1,0 +1,247 @@
+//! TIFF: grey, RGB, with alpha or without, 8 and 16 bits, half and float, strips or tiles, planes or pixels.
+//!
+//! Written uncompressed by default: TIFF is what one hands to another program, and the next program reads that fastest.
+
+use std::io::{Cursor, Seek, Write};
+
+use tiff::decoder::{BufferLayoutPreference, Decoder, DecodingResult, Limits as Memory};
+use tiff::encoder::{DeflateLevel, TiffEncoder, colortype};
+use tiff::tags::{ExtraSamples, Tag};
+use tiff::{ColorType, TiffError};
+
+use crate::colour::Colour;
+use crate::error::Fault;
+use crate::form::Compression;
+use crate::icc;
+use crate::picture::{Alpha, Channels, Header, Layout, Metadata, Picture, Sample};
+use crate::raster;
+use crate::source::{Format, Limits};
+
+struct Opened<'a> {
+    decoder: Decoder<Cursor<&'a [u8]>>,
+    header: Header,
+    kind: ColorType,
+    layout: BufferLayoutPreference,
+    profile: Option<Vec<u8>>,
+    orientation: u16,
+}
+
+fn open<'a>(bytes: &'a [u8], limits: &Limits) -> Result<Opened<'a>, Fault> {
+    let mut memory = Memory::default();
+    memory.decoding_buffer_size = limits.max_bytes as usize;
+    memory.intermediate_buffer_size = limits.max_bytes as usize;
+    memory.ifd_value_size = 64 << 20;
+    let mut decoder = Decoder::new(Cursor::new(bytes)).map_err(fault)?.with_limits(memory);
+    let (width, height) = decoder.dimensions().map_err(fault)?;
+    limits.check(width.into(), height.into(), 16)?;
+    let kind = decoder.colortype().map_err(fault)?;
+    let layout = decoder.image_buffer_layout().map_err(fault)?;
+    let channels = match kind {
+        ColorType::Gray(_) => Channels::Y,
+        ColorType::GrayA(_) | ColorType::Multiband { num_samples: 2, .. } => Channels::Ya,
+        ColorType::RGB(_) | ColorType::Palette(_) => Channels::Rgb,
+        ColorType::RGBA(_) => Channels::Rgba,
+        other => return Err(Fault::unsupported(format!("pixels of type {other:?}; save it as grey or RGB"))),
+    };
+    let sample = match (layout.sample_format, kind.bit_depth()) {
+        (tiff::tags::SampleFormat::Uint, 16) => Sample::U16,
+        (tiff::tags::SampleFormat::Uint, _) if matches!(kind, ColorType::Palette(_)) => Sample::U16,
+        (tiff::tags::SampleFormat::Uint, 1 | 2 | 4 | 8) => Sample::U8,
+        (tiff::tags::SampleFormat::IEEEFP, 16) => Sample::F16,
+        (tiff::tags::SampleFormat::IEEEFP, 32 | 64) => Sample::F32,
+        (format, bits) => return Err(Fault::unsupported(format!("{bits}-bit {format:?} samples"))),
+    };
+    let extra = decoder.find_tag_unsigned_vec::<u16>(Tag::ExtraSamples).ok().flatten().unwrap_or_default();
+    let alpha = match (channels.has_alpha(), extra.first()) {
+        (false, _) => Alpha::None,
+        (true, Some(1)) => Alpha::Associated,
+        (true, _) => Alpha::Straight,
+    };
+    let orientation = decoder.find_tag_unsigned::<u16>(Tag::Orientation).ok().flatten().unwrap_or(1);
+    let profile = decoder.find_tag(Tag::IccProfile).ok().flatten().and_then(|value| value.into_u8_vec().ok());
+    let compression = decoder.find_tag_unsigned::<u16>(Tag::Compression).ok().flatten();
+    let compression = match compression {
+        None | Some(1) => "none".to_owned(),
+        Some(5) => "lzw".to_owned(),
+        Some(7) => "jpeg".to_owned(),
+        Some(8 | 32946) => "deflate".to_owned(),
+        Some(32773) => "packbits".to_owned(),
+        Some(other) => format!("method {other}"),
+    };
+    let header = Header {
+        format: Format::Tiff,
+        width,
+        height,
+        sample,
+        channels,
+        alpha,
+        colour: if sample.is_float() { Colour::LINEAR_REC709 } else { Colour::SRGB },
+        channel_names: Vec::new(),
+        layers: Vec::new(),
+        metadata: Metadata {
+            sample: Some(sample),
+            compression: Some(compression),
+            had_alpha: channels.has_alpha(),
+            ..Metadata::default()
+        },
+    };
+    Ok(Opened { decoder, header, kind, layout, profile, orientation })
+}
+
+pub(crate) fn header(bytes: &[u8], limits: &Limits, profiles: bool) -> Result<Header, Fault> {
+    let opened = open(bytes, limits)?;
+    let mut header = opened.header;
+    if raster::exif_orientation(opened.orientation).is_some_and(raster::swaps_sides) {
+        std::mem::swap(&mut header.width, &mut header.height);
+    }
+    header.apply_profile(opened.profile.as_deref().filter(|_| profiles));
+    Ok(header)
+}
+
+pub(crate) fn decode(bytes: &[u8], limits: &Limits, profiles: bool) -> Result<Picture, Fault> {
+    let Opened { mut decoder, header, kind, layout, profile, orientation } = open(bytes, limits)?;
+    let mut decoded = DecodingResult::U8(Vec::new());
+    decoder.read_image_to_buffer(&mut decoded).map_err(fault)?;
+    let mut pixels = match decoded {
+        DecodingResult::U8(values) => values,
+        DecodingResult::U16(values) => bytemuck::cast_slice(&values).to_vec(),
+        DecodingResult::F16(values) => values.iter().flat_map(|value| value.to_bits().to_ne_bytes()).collect(),
+        DecodingResult::F32(values) => bytemuck::cast_slice(&values).to_vec(),
+        DecodingResult::F64(values) => values.iter().flat_map(|&value| (value as f32).to_ne_bytes()).collect(),
+        _ => return Err(Fault::unsupported("signed or 32-bit integer samples")),
+    };
+    let (width, height) = (header.width as usize, header.height as usize);
+    match kind {
+        ColorType::Palette(bits) => {
+            let indices = unpack(&pixels, width, height, bits, 1)?;
+            pixels = look_up(&mut decoder, &indices, bits)?;
+        }
+        ColorType::Gray(bits @ (1 | 2 | 4)) => {
+            pixels = unpack(&pixels, width, height, bits, 255 / ((1 << bits) - 1))?;
+        }
+        _ => {}
+    }
+    let expected = Picture::byte_count(header.width, header.height, header.channels, header.sample);
+    if expected != Some(pixels.len()) {
+        return Err(Fault::damaged("its pixels do not fill its size"));
+    }
+    let memory = if layout.planes > 1 { Layout::Planar } else { Layout::Interleaved };
+    let mut picture = header.picture(memory, pixels);
+    if picture.layout == Layout::Planar {
+        picture = interleave(picture);
+    }
+    if let Some(orientation) = raster::exif_orientation(orientation) {
+        picture = raster::orient(picture, orientation);
+    }
+    icc::apply(profile.as_deref().filter(|_| profiles), picture)
+}
+
+/// Pixels of 1, 2, 4 or 8 bits, rows padded to bytes → bytes, multiplied by `scale`.
+fn unpack(packed: &[u8], width: usize, height: usize, bits: u8, scale: u8) -> Result<Vec<u8>, Fault> {
+    if !matches!(bits, 1 | 2 | 4 | 8) {
+        return Err(Fault::unsupported(format!("{bits}-bit palettes")));
+    }
+    let per_byte = 8 / usize::from(bits);
+    let row_bytes = width.div_ceil(per_byte);
+    if packed.len() < row_bytes * height {
+        return Err(Fault::damaged("its pixels do not fill its size"));
+    }
+    let mask = (0xff_u16 >> (8 - bits)) as u8;
+    let rows = packed.chunks_exact(row_bytes).take(height);
+    Ok(rows
+        .flat_map(|row| {
+            (0..width).map(move |x| {
+                let shift = 8 - usize::from(bits) * (x % per_byte + 1);
+                ((row[x / per_byte] >> shift) & mask).wrapping_mul(scale)
+            })
+        })
+        .collect())
+}
+
+/// Palette entries have 16 bits a channel.
+fn look_up(decoder: &mut Decoder<Cursor<&[u8]>>, indices: &[u8], bits: u8) -> Result<Vec<u8>, Fault> {
+    let map = decoder.get_tag_u16_vec(Tag::ColorMap).map_err(fault)?;
+    let entries = 1_usize << bits;
+    if map.len() < 3 * entries {
+        return Err(Fault::damaged("its palette is too short"));
+    }
+    let colour = |&index: &u8| [0, 1, 2].map(|channel| map[channel * entries + usize::from(index)].to_ne_bytes());
+    Ok(indices.iter().flat_map(colour).flatten().collect())
+}
+
+/// The ICC conversion and the orientation want pixels; planar TIFFs are rare enough to pay for it here.
+fn interleave(picture: Picture) -> Picture {
+    let (channels, size) = (picture.channels.count(), picture.sample.bytes());
+    let plane = picture.bytes.len() / channels;
+    let mut bytes = Vec::with_capacity(picture.bytes.len());
+    for at in (0..plane).step_by(size) {
+        for channel in 0..channels {
+            bytes.extend_from_slice(&picture.bytes[channel * plane + at..channel * plane + at + size]);
+        }
+    }
+    Picture { layout: Layout::Interleaved, bytes, ..picture }
+}
+
+pub(crate) fn encode(
+    out: &mut (impl Write + Seek),
+    picture: &Picture,
+    compression: Compression,
+) -> Result<(), Fault> {
+    let mut encoder = TiffEncoder::new(out).map_err(failure)?.with_compression(match compression {
+        Compression::Lzw => tiff::encoder::Compression::Lzw,
+        Compression::Deflate => tiff::encoder::Compression::Deflate(DeflateLevel::default()),
+        Compression::Packbits => tiff::encoder::Compression::Packbits,
+        _ => tiff::encoder::Compression::Uncompressed,
+    });
+    let grey = picture.channels.is_grey();
+    match (picture.sample, grey) {
+        (Sample::U8, true) => write::<colortype::Gray8, _>(&mut encoder, picture, &picture.bytes),
+        (Sample::U8, false) => write::<colortype::RGB8, _>(&mut encoder, picture, &picture.bytes),
+        (Sample::U16, true) => write::<colortype::Gray16, _>(&mut encoder, picture, &words(&picture.bytes)),
+        (Sample::U16, false) => write::<colortype::RGB16, _>(&mut encoder, picture, &words(&picture.bytes)),
+        (Sample::F32, true) => write::<colortype::Gray32Float, _>(&mut encoder, picture, &floats(&picture.bytes)),
+        (Sample::F32, false) => write::<colortype::RGB32Float, _>(&mut encoder, picture, &floats(&picture.bytes)),
+        (Sample::F16, _) => Err(Fault::Form("TIFF holds u8, u16 or float, not half".to_owned())),
+    }
+}
+
+fn write<C: colortype::ColorType, W: Write + Seek>(
+    encoder: &mut TiffEncoder<W>,
+    picture: &Picture,
+    values: &[C::Inner],
+) -> Result<(), Fault>
+where
+    [C::Inner]: tiff::encoder::TiffValue,
+{
+    let mut image = encoder.new_image::<C>(picture.width, picture.height).map_err(failure)?;
+    match picture.alpha {
+        Alpha::None => {}
+        Alpha::Associated => image.extra_samples(&[ExtraSamples::AssociatedAlpha]).map_err(failure)?,
+        Alpha::Straight => image.extra_samples(&[ExtraSamples::UnassociatedAlpha]).map_err(failure)?,
+    }
+    image.write_data(values).map_err(failure)
+}
+
+fn words(bytes: &[u8]) -> Vec<u16> {
+    bytes.as_chunks::<2>().0.iter().map(|&word| u16::from_ne_bytes(word)).collect()
+}
+
+fn floats(bytes: &[u8]) -> Vec<f32> {
+    bytes.as_chunks::<4>().0.iter().map(|&word| f32::from_ne_bytes(word)).collect()
+}
+
+fn fault(error: TiffError) -> Fault {
+    match error {
+        TiffError::UnsupportedError(error) => Fault::unsupported(error),
+        TiffError::LimitsExceeded => Fault::TooLarge("it needs more memory than the limit".to_owned()),
+        TiffError::IoError(_) => Fault::damaged("it ends too early"),
+        other => Fault::damaged(other),
+    }
+}
+
+fn failure(error: TiffError) -> Fault {
+    match error {
+        TiffError::IoError(error) => Fault::Io(error),
+        other => Fault::Form(other.to_string()),
+    }
+}
