@@ -118,8 +118,8 @@ impl Colour {
     /// sRGB.
     pub const SRGB: Self = Self { primaries: Primaries::REC709, transfer: Transfer::Srgb };
 
-    /// Linear RGB of this space → linear Rec.709, rows first; white goes to white (Bradford). Exactly the identity
-    /// for Rec.709 primaries, and for primaries that span no space.
+    /// Linear RGB of this space → linear Rec.709, rows first; white goes to white (Bradford), except for CIE XYZ,
+    /// which is absolute. Exactly the identity for Rec.709 primaries, and for primaries that span no space.
     pub fn to_working_matrix(&self) -> [[f32; 3]; 3] {
         narrow(self.working(false))
     }
@@ -136,7 +136,10 @@ impl Colour {
         let matrix = || {
             let here = self.primaries.to_xyz()?;
             let working = inverse(&Primaries::REC709.to_xyz()?)?;
-            let adapted = multiply(&bradford(self.primaries.white, D65)?, &here);
+            // A file of CIE XYZ holds tristimulus values as they are. Its "white" is a unit of measurement and not
+            // what the scene was adapted to: OpenEXR's own sample of one picture in both spaces says so.
+            let absolute = self.primaries == Primaries::XYZ;
+            let adapted = if absolute { here } else { multiply(&bradford(self.primaries.white, D65)?, &here) };
             let to = multiply(&working, &adapted);
             if from { inverse(&to) } else { Some(to) }
         };
@@ -274,7 +277,7 @@ mod tests {
 
     #[test]
     fn white_stays_white_and_there_is_a_way_back() {
-        for primaries in [Primaries::REC2020, Primaries::P3, Primaries::ACES2065_1, Primaries::XYZ] {
+        for primaries in [Primaries::REC2020, Primaries::P3, Primaries::ACES2065_1] {
             let colour = Colour { primaries, transfer: Transfer::Linear };
             let (to, from) = (colour.to_working_matrix(), colour.from_working_matrix());
             let wide = |m: [[f32; 3]; 3]| m.map(|row| row.map(f64::from));
@@ -283,6 +286,13 @@ mod tests {
             }
             near(narrow(multiply(&wide(to), &wide(from))), IDENTITY, 1e-5);
         }
+    }
+
+    #[test]
+    fn xyz_is_absolute() {
+        // IEC 61966-2-1: XYZ → linear sRGB.
+        let want = [[3.2406, -1.5372, -0.4986], [-0.9689, 1.8758, 0.0415], [0.0557, -0.2040, 1.0570]];
+        near(Colour { primaries: Primaries::XYZ, transfer: Transfer::Linear }.to_working_matrix(), want, 1e-3);
     }
 
     #[test]

@@ -203,7 +203,7 @@ pub(crate) fn encode(
             JpegEncoder::new_with_quality(out, quality).write_image(&picture.bytes, width, height, kind)
         }
         Format::WebP => WebPEncoder::new_lossless(out).write_image(&picture.bytes, width, height, kind),
-        Format::Hdr => HdrEncoder::new(out).write_image(&picture.bytes, width, height, kind),
+        Format::Hdr => HdrEncoder::new(out).write_image(&representable(&picture.bytes), width, height, kind),
         _ => {
             let mut encoder = qoi::Encoder::new(&picture.bytes, width, height)
                 .map_err(|error| Fault::Form(error.to_string()))?;
@@ -218,6 +218,17 @@ pub(crate) fn encode(
         ImageError::IoError(error) => Fault::Io(error),
         other => Fault::Form(other.to_string()),
     })
+}
+
+/// RGBE has no sign, no NaN and no infinity (and the encoder overflows on them): they become 0 and its largest value.
+fn representable(bytes: &[u8]) -> std::borrow::Cow<'_, [u8]> {
+    const LARGEST: f32 = 1.69e38;
+    let values = bytes.as_chunks::<4>().0;
+    if values.iter().all(|&value| (0.0..=LARGEST).contains(&f32::from_ne_bytes(value))) {
+        return bytes.into();
+    }
+    // `max` and `min` prefer the number to a NaN.
+    values.iter().flat_map(|&value| f32::from_ne_bytes(value).max(0.0).min(LARGEST).to_ne_bytes()).collect()
 }
 
 fn fault(error: ImageError) -> Fault {

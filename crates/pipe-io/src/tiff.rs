@@ -1,4 +1,5 @@
-//! TIFF: grey, RGB, with alpha or without, 8 and 16 bits, half and float, strips or tiles, planes or pixels.
+//! TIFF: grey, RGB, with alpha or without, 8 and 16 bits, half and float, strips or tiles, planes or pixels; bilevel.
+//! Palettes and CMYK are not read: the `tiff` crate refuses the one, and the other is no light without its profile.
 //!
 //! Written uncompressed by default: TIFF is what one hands to another program, and the next program reads that fastest.
 
@@ -39,13 +40,12 @@ fn open<'a>(bytes: &'a [u8], limits: &Limits) -> Result<Opened<'a>, Fault> {
     let channels = match kind {
         ColorType::Gray(_) => Channels::Y,
         ColorType::GrayA(_) | ColorType::Multiband { num_samples: 2, .. } => Channels::Ya,
-        ColorType::RGB(_) | ColorType::Palette(_) => Channels::Rgb,
+        ColorType::RGB(_) => Channels::Rgb,
         ColorType::RGBA(_) => Channels::Rgba,
         other => return Err(Fault::unsupported(format!("pixels of type {other:?}; save it as grey or RGB"))),
     };
     let sample = match (layout.sample_format, kind.bit_depth()) {
         (tiff::tags::SampleFormat::Uint, 16) => Sample::U16,
-        (tiff::tags::SampleFormat::Uint, _) if matches!(kind, ColorType::Palette(_)) => Sample::U16,
         (tiff::tags::SampleFormat::Uint, 1 | 2 | 4 | 8) => Sample::U8,
         (tiff::tags::SampleFormat::IEEEFP, 16) => Sample::F16,
         (tiff::tags::SampleFormat::IEEEFP, 32 | 64) => Sample::F32,
@@ -111,15 +111,8 @@ pub(crate) fn decode(bytes: &[u8], limits: &Limits, profiles: bool) -> Result<Pi
         _ => return Err(Fault::unsupported("signed or 32-bit integer samples")),
     };
     let (width, height) = (header.width as usize, header.height as usize);
-    match kind {
-        ColorType::Palette(bits) => {
-            let indices = unpack(&pixels, width, height, bits, 1)?;
-            pixels = look_up(&mut decoder, &indices, bits)?;
-        }
-        ColorType::Gray(bits @ (1 | 2 | 4)) => {
-            pixels = unpack(&pixels, width, height, bits, 255 / ((1 << bits) - 1))?;
-        }
-        _ => {}
+    if let ColorType::Gray(bits @ (1 | 2 | 4)) = kind {
+        pixels = unpack(&pixels, width, height, bits)?;
     }
     let expected = Picture::byte_count(header.width, header.height, header.channels, header.sample);
     if expected != Some(pixels.len()) {
@@ -136,37 +129,23 @@ pub(crate) fn decode(bytes: &[u8], limits: &Limits, profiles: bool) -> Result<Pi
     icc::apply(profile.as_deref().filter(|_| profiles), picture)
 }
 
-/// Pixels of 1, 2, 4 or 8 bits, rows padded to bytes → bytes, multiplied by `scale`.
-fn unpack(packed: &[u8], width: usize, height: usize, bits: u8, scale: u8) -> Result<Vec<u8>, Fault> {
-    if !matches!(bits, 1 | 2 | 4 | 8) {
-        return Err(Fault::unsupported(format!("{bits}-bit palettes")));
-    }
+/// Grey of 1, 2 or 4 bits, rows padded to bytes → 8 bits.
+fn unpack(packed: &[u8], width: usize, height: usize, bits: u8) -> Result<Vec<u8>, Fault> {
     let per_byte = 8 / usize::from(bits);
     let row_bytes = width.div_ceil(per_byte);
     if packed.len() < row_bytes * height {
         return Err(Fault::damaged("its pixels do not fill its size"));
     }
-    let mask = (0xff_u16 >> (8 - bits)) as u8;
+    let largest = (1_u8 << bits) - 1;
     let rows = packed.chunks_exact(row_bytes).take(height);
     Ok(rows
         .flat_map(|row| {
             (0..width).map(move |x| {
                 let shift = 8 - usize::from(bits) * (x % per_byte + 1);
-                ((row[x / per_byte] >> shift) & mask).wrapping_mul(scale)
+                ((row[x / per_byte] >> shift) & largest) * (255 / largest)
             })
         })
         .collect())
-}
-
-/// Palette entries have 16 bits a channel.
-fn look_up(decoder: &mut Decoder<Cursor<&[u8]>>, indices: &[u8], bits: u8) -> Result<Vec<u8>, Fault> {
-    let map = decoder.get_tag_u16_vec(Tag::ColorMap).map_err(fault)?;
-    let entries = 1_usize << bits;
-    if map.len() < 3 * entries {
-        return Err(Fault::damaged("its palette is too short"));
-    }
-    let colour = |&index: &u8| [0, 1, 2].map(|channel| map[channel * entries + usize::from(index)].to_ne_bytes());
-    Ok(indices.iter().flat_map(colour).flatten().collect())
 }
 
 /// The ICC conversion and the orientation want pixels; planar TIFFs are rare enough to pay for it here.

@@ -49,8 +49,10 @@ pub(super) fn all(parts: &[Part]) -> Vec<Layer> {
                 prefixes.push(prefix);
             }
         }
+        // A part of one layer is known by the part's name, whatever its channels are called.
+        let alone = prefixes.len() == 1;
         for prefix in prefixes {
-            layers.push(layer_of(parts.len() > 1, index, part, &prefix));
+            layers.push(layer_of(parts.len() > 1, alone, index, part, &prefix));
         }
     }
     layers
@@ -116,10 +118,10 @@ fn single_channel(parts: &[Part], wanted: &str) -> Option<Layer> {
     })
 }
 
-fn layer_of(multipart: bool, index: usize, part: &Part, prefix: &str) -> Layer {
+fn layer_of(multipart: bool, alone: bool, index: usize, part: &Part, prefix: &str) -> Layer {
     let name = part_name(part);
     let label = match &name {
-        Some(name) if multipart && (prefix.is_empty() || prefix == name) => name.clone(),
+        Some(name) if multipart && (alone || prefix.is_empty() || prefix == name) => name.clone(),
         Some(name) if multipart => format!("{name}.{prefix}"),
         _ => prefix.to_owned(),
     };
@@ -166,7 +168,8 @@ fn pick(part: &Part, prefix: &str) -> (Meaning, Vec<Option<usize>>, Option<Strin
             (_, Some(_), _, Some(ry), Some(by)) => {
                 (Meaning::LuminanceChroma, with_alpha(vec![y, Some(ry), Some(by)]))
             }
-            (Some(_), Some(_), Some(_), ..) => (Meaning::Values, vec![x, y, z]),
+            // A vector's components. Without an X, a Y is luminance, and a Z beside it is depth.
+            (Some(_), Some(_), ..) => (Meaning::Values, vec![x, y, z]),
             (_, Some(_), ..) => (Meaning::Colour, with_alpha(vec![y])),
             _ => {
                 let others: Vec<_> = members.iter().map(|(i, _)| *i).filter(|i| Some(*i) != alpha).map(Some).collect();

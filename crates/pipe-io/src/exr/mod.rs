@@ -94,7 +94,12 @@ impl Opened {
         if u128::from(tables) + chunks * 16 > u128::from(length) {
             return Err(Fault::damaged(format!("it is cut off: its {chunks} blocks do not fit in {length} bytes")));
         }
-        MetaData::validate(&meta.headers, false).map_err(fault)?;
+        // The crate refuses every subsampled channel; ours are validated where they are read.
+        let mut plain = meta.headers.clone();
+        for channel in plain.iter_mut().flat_map(|part| &mut part.channels.list) {
+            channel.sampling = exr::math::Vec2(1, 1);
+        }
+        MetaData::validate(&plain, false).map_err(fault)?;
 
         let layers = layer::all(&meta.headers);
         let layer = layer::choose(&layers, &meta.headers, wanted)?;
