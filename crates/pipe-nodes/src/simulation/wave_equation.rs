@@ -1,0 +1,327 @@
+//! `WaveEquation`: waves on a grid, by seven integrators.
+
+use pipe_graph::node::scalar;
+use pipe_graph::prelude::*;
+use smart_default::SmartDefault;
+
+use super::energy;
+use super::implicit::Solver;
+use super::stability::exceeded_limit;
+use super::state::begin;
+use super::wave::{Boundary, Grid64, Medium};
+use crate::shader;
+
+/// Solves ∂u/∂t = v, ∂v/∂t = c²∇²u − damping·v for `steps` steps of `dt`, with the 5-point ∇² on a grid of
+/// spacing `dx`. The result has two channels: R = u, G = v.
+///
+/// `Euler`, `Midpoint` and `RungeKutta2` gain energy, `BackwardEuler` loses it; `SymplecticEuler`, `Verlet` and
+/// `CrankNicolson` keep it. A `dt` that an explicit integrator does not bear is a warning that tells the limit.
+#[derive(Debug, SmartDefault, Serialize, Deserialize, JsonSchema)]
+#[serde(default)]
+pub(crate) struct WaveEquation {
+    /// R = u, G = v; a 1-channel image is u at rest.
+    state: In<Image>,
+    /// Time steps.
+    #[default = 100]
+    #[schemars(range(min = 0, max = 100_000_000))]
+    steps: u32,
+    /// Length of a time step.
+    #[default = 0.0001]
+    #[schemars(extend("exclusiveMinimum" = 0.0, "x-unit" = "s"))]
+    dt: f32,
+    /// Distance between pixels.
+    #[default = 0.01]
+    #[schemars(extend("exclusiveMinimum" = 0.0, "x-unit" = "m"))]
+    dx: f32,
+    /// Square of the wave's speed.
+    #[default = 20.0]
+    #[schemars(range(min = 0.0), extend("x-unit" = "m²/s²"))]
+    c2: f32,
+    /// How time is discretised.
+    integrator: Integrator,
+    /// What lies outside the grid.
+    boundary: Boundary,
+    /// Share of its velocity that a pixel loses in a unit of time.
+    #[schemars(range(min = 0.0), extend("x-unit" = "1/s"))]
+    damping: f32,
+    /// How far an implicit step is solved: what is left of the error of its first guess (the velocity before).
+    #[default = 1e-6]
+    #[schemars(range(min = 1e-9, max = 0.1))]
+    tolerance: f32,
+}
+
+/// How time is discretised.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub(super) enum Integrator {
+    /// Explicit Euler: u⁺ = u + dt·v, v⁺ = v + dt·(c²∇²u − γv).
+    Euler,
+    /// The new velocity moves u: u⁺ = u + dt·v⁺.
+    #[default]
+    SymplecticEuler,
+    /// The slope half a step ahead.
+    Midpoint,
+    /// Heun's method: the mean of the slopes at both ends.
+    RungeKutta2,
+    /// Velocity form: u⁺ = u + dt·v + dt²/2·a, v⁺ = v + dt/2·(a + a⁺).
+    Verlet,
+    /// The slope at the end; stable at any `dt`.
+    BackwardEuler,
+    /// The mean of the slopes at both ends, implicitly; stable at any `dt`.
+    CrankNicolson,
+}
+
+pub(crate) const KIND: Kind = Kind::of::<WaveEquation>(
+    "WaveEquation",
+    Category::Simulation,
+    &[
+        r#"WaveEquation(state: "pair", steps: 10)"#,
+        r#"WaveEquation(state: "in", steps: 20, dt: 0.3, dx: 1, c2: 1, integrator: SymplecticEuler, boundary: Periodic)"#,
+        r#"WaveEquation(state: "grey", steps: 20, dt: 0.3, dx: 1, c2: 1, boundary: Absorbing)"#,
+        r#"WaveEquation(state: "pair", steps: 20, dt: 0.1, dx: 1, c2: 2, integrator: Euler, boundary: Dirichlet)"#,
+        r#"WaveEquation(state: "pair", steps: 9, dt: 0.1, dx: 1, c2: 1, integrator: Euler, boundary: Absorbing, damping: 0.5)"#,
+        r#"WaveEquation(state: "pair", steps: 10, dt: 0.2, dx: 1, c2: 1, integrator: Midpoint, boundary: Absorbing)"#,
+        r#"WaveEquation(state: "pair", steps: 10, dt: 0.2, dx: 1, c2: 1, integrator: Midpoint, boundary: Neumann, damping: 0.3)"#,
+        r#"WaveEquation(state: "pair", steps: 10, dt: 0.2, dx: 1, c2: 1, integrator: RungeKutta2, boundary: Dirichlet, damping: 0.3)"#,
+        r#"WaveEquation(state: "pair", steps: 10, dt: 0.2, dx: 1, c2: 1, integrator: RungeKutta2, boundary: Absorbing)"#,
+        r#"WaveEquation(state: "pair", steps: 1, dt: 0.4, dx: 1, c2: 1, integrator: Verlet, boundary: Dirichlet)"#,
+        r#"WaveEquation(state: "pair", steps: 20, dt: 0.4, dx: 1, c2: 1, integrator: Verlet, boundary: Absorbing, damping: 0.2)"#,
+        r#"WaveEquation(state: "pair", steps: 20, dt: 0.4, dx: 1, c2: 1, integrator: Verlet, boundary: Periodic)"#,
+        r#"WaveEquation(state: "pair", steps: 3, dt: 0.5, dx: 1, c2: 1, integrator: BackwardEuler)"#,
+        r#"WaveEquation(state: "pair", steps: 3, dt: 2, dx: 1, c2: 1, integrator: BackwardEuler, boundary: Periodic, damping: 0.2)"#,
+        r#"WaveEquation(state: "in", steps: 3, dt: 2, dx: 1, c2: 1, integrator: CrankNicolson, boundary: Dirichlet)"#,
+        r#"WaveEquation(state: "pair", steps: 4, dt: 0.5, dx: 1, c2: 1, integrator: CrankNicolson, boundary: Absorbing, damping: 0.2)"#,
+        r#"WaveEquation(state: "pair", steps: 0)"#,
+    ],
+)
+.ports(&[("out", "R = u, G = v after the last step"), ("energy", "½∫v² + ½c²∫|∇u|² over the grid, after the last step")])
+// Relative to the largest velocities: rounding of u is multiplied by c²·dt/dx² in each step.
+.tolerance(1e-3, 1e-4);
+
+impl WaveEquation {
+    const fn medium(&self) -> Medium {
+        Medium { dt: self.dt, dx: self.dx, c2: self.c2, damping: self.damping, boundary: self.boundary }
+    }
+
+    /// θ of an implicit integrator.
+    const fn theta(&self) -> Option<f64> {
+        match self.integrator {
+            Integrator::BackwardEuler => Some(1.0),
+            Integrator::CrankNicolson => Some(0.5),
+            _ => None,
+        }
+    }
+
+    fn solver(&self, theta: f64, size: [u32; 2]) -> Solver {
+        Solver::new(theta, &self.medium(), size, f64::from(self.tolerance))
+    }
+
+    fn explicit(&self, cx: &mut Lowering<'_>, state: ResourceId) -> Result<ResourceId, Mistake> {
+        let medium = self.medium();
+        let shape = cx.shape(state);
+        let result = cx.repeat("", Count::Fixed(self.steps), &[state], |cx, states| {
+            let next = cx.intermediate("next", shape);
+            medium
+                .pass(cx, "step", &shader!("simulation/wave_explicit"), states[0])
+                .write("out", next)
+                .constant("METHOD", self.integrator as i32)
+                .add();
+            Ok(vec![next])
+        })?;
+        Ok(result[0])
+    }
+
+    fn verlet(&self, cx: &mut Lowering<'_>, state: ResourceId) -> Result<ResourceId, Mistake> {
+        let medium = self.medium();
+        let shape = cx.shape(state);
+        let stage = |cx: &mut Lowering<'_>, suffix: &str, stage: i32, from: ResourceId| {
+            let next = cx.intermediate(suffix, shape);
+            let shader = shader!("simulation/wave_verlet");
+            medium.pass(cx, suffix, &shader, from).write("out", next).constant("STAGE", stage).add();
+            next
+        };
+        let ahead = stage(cx, "start", 0, state);
+        let almost = if self.steps > 1 {
+            cx.repeat("", Count::Fixed(self.steps - 1), &[ahead], |cx, states| Ok(vec![stage(cx, "step", 1, states[0])]))?[0]
+        } else {
+            ahead
+        };
+        Ok(stage(cx, "end", 2, almost))
+    }
+
+    fn implicit(&self, cx: &mut Lowering<'_>, theta: f64, state: ResourceId) -> Result<ResourceId, Mistake> {
+        let medium = self.medium();
+        let shape = cx.shape(state);
+        let size = cx.image_of(state).size;
+        let solver = self.solver(theta, size);
+        let theta = theta as f32;
+        let result = cx.repeat("", Count::Fixed(self.steps), &[state], |cx, states| {
+            let (rhs, guess) = (cx.intermediate("rhs", Shape::image(size, 1)), cx.intermediate("guess", shape));
+            medium
+                .pass(cx, "rhs", &shader!("simulation/wave_rhs"), states[0])
+                .entry(Entry::Each)
+                .write("rhs", rhs)
+                .write("guess", guess)
+                .param("theta", theta)
+                .add();
+            let solution = cx.repeat("solve", Count::Fixed(solver.iterations), &[guess], |cx, pair| {
+                let next = cx.intermediate("solution", shape);
+                medium
+                    .pass(cx, "relax", &shader!("simulation/wave_relax"), pair[0])
+                    .read("rhs", rhs, Reach::Point)
+                    .write("out", next)
+                    .param("theta", theta)
+                    .param("gain", solver.gain as f32)
+                    .param("inertia", solver.inertia as f32)
+                    .add();
+                Ok(vec![next])
+            })?[0];
+            let next = cx.intermediate("next", shape);
+            cx.pass("finish", shader!("simulation/wave_finish"))
+                .entry(Entry::Point)
+                .read("state", states[0], Reach::Point)
+                .read("solution", solution, Reach::Point)
+                .write("out", next)
+                .param("theta", theta)
+                .param("dt", self.dt)
+                .add();
+            Ok(vec![next])
+        })?;
+        Ok(result[0])
+    }
+}
+
+impl Node for WaveEquation {
+    fn outputs(&self, inputs: &mut Inputs<'_>) -> Result<Vec<Output>, Mistake> {
+        let size = inputs.image(&self.state).size;
+        let medium = self.medium();
+        if let Some(theta) = self.theta() {
+            let iterations = self.solver(theta, size).iterations;
+            if iterations > 1000 {
+                inputs.warn(
+                    Mistake::in_field("dt", format!("each step takes {iterations} iterations of the solver"))
+                        .hint("a smaller `dt` or a larger `tolerance` is cheaper"),
+                );
+            }
+        } else if let Some(limit) = exceeded_limit(self.integrator, &medium, self.steps) {
+            let hint = match self.integrator {
+                Integrator::SymplecticEuler | Integrator::Verlet => {
+                    format!("expected at most {limit:.6}; `BackwardEuler` and `CrankNicolson` are stable at any `dt`")
+                }
+                _ => format!(
+                    "at most {limit:.6} keeps the fastest wave of {} steps from growing tenfold; `SymplecticEuler` and `Verlet` do not grow",
+                    self.steps
+                ),
+            };
+            let message = format!("{} is beyond the stability limit of `{:?}`, {limit:.6}", self.dt, self.integrator);
+            inputs.warn(Mistake::in_field("dt", message).hint(hint));
+        }
+        Ok(vec![Output::new("out", EdgeType::image(size, 2)), Output::new("energy", scalar(1))])
+    }
+
+    fn lower(&self, cx: &mut Lowering<'_>) -> Result<(), Mistake> {
+        let image = cx.input(&self.state);
+        let state = begin(cx, image);
+        let end = match (self.steps, self.integrator, self.theta()) {
+            (0, ..) => state,
+            (_, Integrator::Verlet, _) => self.verlet(cx, state)?,
+            (_, _, Some(theta)) => self.implicit(cx, theta, state)?,
+            _ => self.explicit(cx, state)?,
+        };
+        cx.emit("out", end);
+        let out = cx.output("energy");
+        energy::lower(cx, &self.medium(), end, out);
+        Ok(())
+    }
+
+    fn reference(&self, cx: &Reference<'_>) -> Vec<Tensor> {
+        let image = cx.image(&self.state);
+        let grid = Grid64 { size: image.size, medium: self.medium() };
+        let mut u: Vec<f64> = image.pixels.iter().map(|p| p[0]).collect();
+        let mut v: Vec<f64> = image.pixels.iter().map(|p| if image.channels == 1 { 0.0 } else { p[1] }).collect();
+        for _ in 0..self.steps {
+            (u, v) = step(&grid, self.integrator, &u, &v);
+        }
+        let energy = grid.energy(&u, &v);
+        let pixels = u.into_iter().zip(v).map(|(u, v)| [u, v, 0.0, 1.0]).collect();
+        vec![Tensor::Image(Raster { size: image.size, channels: 2, pixels }), Tensor::Scalar(vec![energy])]
+    }
+}
+
+/// a + k·b
+fn plus(a: &[f64], k: f64, b: &[f64]) -> Vec<f64> {
+    a.iter().zip(b).map(|(a, b)| a + k * b).collect()
+}
+
+/// One step of the twin, each method as its textbook writes it.
+fn step(grid: &Grid64, integrator: Integrator, u: &[f64], v: &[f64]) -> (Vec<f64>, Vec<f64>) {
+    let h = f64::from(grid.medium.dt);
+    let gamma = grid.damping();
+    let slope = |u: &[f64], v: &[f64]| -> Vec<f64> {
+        grid.curvature(u).iter().zip(v).zip(&gamma).map(|((l, v), g)| l - g * v).collect()
+    };
+    let a = slope(u, v);
+    match integrator {
+        Integrator::Euler => (plus(u, h, v), plus(v, h, &a)),
+        Integrator::SymplecticEuler => {
+            let v = plus(v, h, &a);
+            (plus(u, h, &v), v)
+        }
+        Integrator::Midpoint => {
+            let (um, vm) = (plus(u, h / 2.0, v), plus(v, h / 2.0, &a));
+            (plus(u, h, &vm), plus(v, h, &slope(&um, &vm)))
+        }
+        Integrator::RungeKutta2 => {
+            let (u1, v1) = (plus(u, h, v), plus(v, h, &a));
+            let b = slope(&u1, &v1);
+            (plus(u, h / 2.0, &plus(v, 1.0, &v1)), plus(v, h / 2.0, &plus(&a, 1.0, &b)))
+        }
+        Integrator::Verlet => {
+            let u = plus(&plus(u, h, v), h * h / 2.0, &a);
+            // a⁺ = c²∇²u⁺ − γv⁺ holds the v⁺ that is wanted.
+            let pulled = plus(&plus(v, h / 2.0, &a), h / 2.0, &grid.curvature(&u));
+            let v = pulled.iter().zip(&gamma).map(|(p, g)| p / (1.0 + h / 2.0 * g)).collect();
+            (u, v)
+        }
+        Integrator::BackwardEuler => {
+            // v⁺ = v + h·(c²∇²(u + h·v⁺) − γv⁺)
+            let rhs = plus(v, h, &grid.curvature(u));
+            let next = solve(&rhs, v, |x| plus(&damped(x, h, &gamma), -h * h, &grid.curvature(x)));
+            (plus(u, h, &next), next)
+        }
+        Integrator::CrankNicolson => {
+            // v⁺ = v + h/2·(a + c²∇²(u + h/2·(v + v⁺)) − γv⁺)
+            let k = h / 2.0;
+            let rhs = plus(&plus(v, k, &a), k, &grid.curvature(&plus(u, k, v)));
+            let next = solve(&rhs, v, |x| plus(&damped(x, k, &gamma), -k * k, &grid.curvature(x)));
+            (plus(u, k, &plus(v, 1.0, &next)), next)
+        }
+    }
+}
+
+/// (1 + k·γ)·x
+fn damped(x: &[f64], k: f64, gamma: &[f64]) -> Vec<f64> {
+    x.iter().zip(gamma).map(|(x, g)| x * (1.0 + k * g)).collect()
+}
+
+/// Conjugate gradients for a symmetric positive definite product, to the last digits.
+fn solve(rhs: &[f64], guess: &[f64], product: impl Fn(&[f64]) -> Vec<f64>) -> Vec<f64> {
+    let dot = |a: &[f64], b: &[f64]| -> f64 { a.iter().zip(b).map(|(a, b)| a * b).sum() };
+    let mut x = guess.to_vec();
+    let mut r = plus(rhs, -1.0, &product(&x));
+    let mut p = r.clone();
+    let mut rr = dot(&r, &r);
+    let small = 1e-28 * dot(rhs, rhs);
+    for _ in 0..10_000 {
+        if rr <= small {
+            break;
+        }
+        let ap = product(&p);
+        let alpha = rr / dot(&p, &ap);
+        x = plus(&x, alpha, &p);
+        r = plus(&r, -alpha, &ap);
+        let next = dot(&r, &r);
+        p = plus(&r, next / rr, &p);
+        rr = next;
+    }
+    x
+}

@@ -1,0 +1,3 @@
+fn apply(image: vec4f) -> vec4f {
+    return image;
+}
