@@ -33,15 +33,12 @@ fn main() {
         (Format::Hdr, Sample::F32, Channels::Rgb, None),
         (Format::Pfm, Sample::F32, Channels::Rgb, None),
     ] {
-        let options = WriteOptions {
-            pixel_type: Some(sample),
-            channels: Some(channels),
-            compression,
-            ..WriteOptions::default()
-        };
+        let options =
+            WriteOptions { pixel_type: Some(sample), channels: Some(channels), compression, ..WriteOptions::default() };
         let target = Target { path: None, format };
         let form = output_form(&target, &options, None).unwrap();
-        let picture = form.picture(width, height, pixels(width, height, channels, sample, form.layout), Metadata::default());
+        let picture =
+            form.picture(width, height, pixels(width, height, channels, sample, form.layout), Metadata::default());
         let (write, bytes) = best(|| encode(&target, &picture, &options).unwrap());
         let input = Input::from_bytes(&Source::file("memory"), bytes.clone(), &ReadOptions::default()).unwrap();
         let (read, _) = best(|| input.read().unwrap());

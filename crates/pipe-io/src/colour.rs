@@ -40,8 +40,7 @@ impl Primaries {
     pub const ACES2065_1: Self =
         Self { red: [0.7347, 0.2653], green: [0.0, 1.0], blue: [0.0001, -0.077], white: ACES_WHITE };
     /// CIE XYZ as an RGB space, white at equal energy.
-    pub const XYZ: Self =
-        Self { red: [1.0, 0.0], green: [0.0, 1.0], blue: [0.0, 0.0], white: [1.0 / 3.0, 1.0 / 3.0] };
+    pub const XYZ: Self = Self { red: [1.0, 0.0], green: [0.0, 1.0], blue: [0.0, 0.0], white: [1.0 / 3.0, 1.0 / 3.0] };
 
     /// RGB → XYZ with Y = 1 for white (SMPTE RP 177-1993); `None` where the primaries span no space.
     pub fn to_xyz(&self) -> Option<Matrix> {

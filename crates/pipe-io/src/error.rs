@@ -5,7 +5,7 @@
 //! it into an [`Error`]. The reason stays a sentence rather than a nested error type: no caller can do more with
 //! "invalid Huffman table" than print it, and the codec crates' own error types would become part of our interface.
 
-use std::io;
+use std::{fmt, io};
 
 use thiserror::Error;
 
@@ -36,7 +36,9 @@ pub enum Error {
         advice: &'static str,
     },
     /// The first bytes belong to no format this crate reads.
-    #[error("`{file}` is no image this program knows: its first bytes match none of {known}; convert it to one of these")]
+    #[error(
+        "`{file}` is no image this program knows: its first bytes match none of {known}; convert it to one of these"
+    )]
     UnknownFormat {
         /// The file as the user named it.
         file: String,
@@ -109,12 +111,14 @@ pub enum Error {
 
 impl Error {
     /// An [`Error::Read`] of `file`.
-    pub(crate) fn read(file: impl ToString, source: io::Error) -> Self {
+    #[allow(clippy::needless_pass_by_value)] // called with temporaries throughout
+    pub(crate) fn read(file: impl fmt::Display, source: io::Error) -> Self {
         Self::Read { file: file.to_string(), source }
     }
 
     /// An [`Error::Write`] of `file`, with advice chosen by the kind of failure.
-    pub(crate) fn write(file: impl ToString, source: io::Error) -> Self {
+    #[allow(clippy::needless_pass_by_value)] // called with temporaries throughout
+    pub(crate) fn write(file: impl fmt::Display, source: io::Error) -> Self {
         let advice = match source.kind() {
             io::ErrorKind::NotFound => "create its folder first",
             io::ErrorKind::PermissionDenied | io::ErrorKind::ReadOnlyFilesystem => {
@@ -150,16 +154,19 @@ pub(crate) enum Fault {
 }
 
 impl Fault {
-    pub(crate) fn damaged(reason: impl ToString) -> Self {
+    #[allow(clippy::needless_pass_by_value)] // called with temporaries throughout
+    pub(crate) fn damaged(reason: impl fmt::Display) -> Self {
         Self::Damaged(reason.to_string())
     }
 
-    pub(crate) fn unsupported(reason: impl ToString) -> Self {
+    #[allow(clippy::needless_pass_by_value)] // called with temporaries throughout
+    pub(crate) fn unsupported(reason: impl fmt::Display) -> Self {
         Self::Unsupported(reason.to_string())
     }
 
     /// Names the file and its format.
-    pub(crate) fn of(self, file: impl ToString, format: Format) -> Error {
+    #[allow(clippy::needless_pass_by_value)] // called with temporaries throughout
+    pub(crate) fn of(self, file: impl fmt::Display, format: Format) -> Error {
         let (file, format) = (file.to_string(), format.name());
         match self {
             Self::Damaged(reason) => Error::Damaged { file, format, reason },

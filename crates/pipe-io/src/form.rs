@@ -7,7 +7,7 @@
 
 use std::str::FromStr;
 
-use crate::colour::{Colour, Colorspace};
+use crate::colour::{Colorspace, Colour};
 use crate::error::{Error, Fault, Result};
 use crate::picture::{Alpha, Channels, Layout, Metadata, Picture, Sample};
 use crate::source::{Format, Target};

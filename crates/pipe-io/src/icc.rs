@@ -86,9 +86,7 @@ fn transfer(curve: &ToneReprCurve) -> Option<Transfer> {
                 [g, a, b] => Box::new(move |x| if x >= -b / a { (a * x + b).powf(g) } else { 0.0 }),
                 [g, a, b, c] => Box::new(move |x| if x >= -b / a { (a * x + b).powf(g) + c } else { c }),
                 [g, a, b, c, d] => Box::new(move |x| if x >= d { (a * x + b).powf(g) } else { c * x }),
-                [g, a, b, c, d, e, f] => {
-                    Box::new(move |x| if x >= d { (a * x + b).powf(g) + e } else { c * x + f })
-                }
+                [g, a, b, c, d, e, f] => Box::new(move |x| if x >= d { (a * x + b).powf(g) + e } else { c * x + f }),
                 _ => return None,
             }
         }
@@ -187,6 +185,34 @@ mod tests {
             for (value, want) in row.iter().zip(want) {
                 assert!((value - want).abs() < 2e-3, "{matrix:?}");
             }
+        }
+    }
+
+    #[test]
+    fn other_curves_are_converted_here() {
+        let mut profile = ColorProfile::new_srgb();
+        let cubic = ToneReprCurve::Lut((0..256).map(|i| ((f64::from(i) / 255.0).powi(3) * 65535.0) as u16).collect());
+        profile.red_trc = Some(cubic.clone());
+        profile.green_trc = Some(cubic.clone());
+        profile.blue_trc = Some(cubic);
+        profile.cicp = None;
+        let before = Picture {
+            width: 2,
+            height: 1,
+            sample: Sample::U8,
+            layout: crate::Layout::Interleaved,
+            channels: Channels::Rgba,
+            alpha: crate::Alpha::Straight,
+            colour: Colour::SRGB,
+            bytes: vec![255, 128, 0, 77, 51, 204, 102, 255],
+            metadata: crate::Metadata::default(),
+        };
+        let after = apply(Some(&profile.encode().unwrap()), before.clone()).unwrap();
+        assert_eq!((after.sample, after.colour), (Sample::F32, Colour::LINEAR_REC709));
+        for (x, channel) in (0..2).flat_map(|x| (0..4).map(move |channel| (x, channel))) {
+            let [got, stored] = [&after, &before].map(|p| p.sample_at(x, 0, channel).unwrap());
+            let want = if channel == 3 { stored } else { stored.powi(3) };
+            assert!((got - want).abs() < 4e-3, "pixel {x}, channel {channel}: {got}, not {want}");
         }
     }
 }

@@ -42,7 +42,7 @@ mod source;
 pub mod table;
 mod tiff;
 
-pub use self::colour::{Colour, Colorspace, Primaries, Transfer};
+pub use self::colour::{Colorspace, Colour, Primaries, Transfer};
 pub use self::error::{Error, Result};
 pub use self::exr::Attributes;
 pub use self::form::{Compression, Form, WriteOptions, output_form};

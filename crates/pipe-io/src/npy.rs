@@ -66,20 +66,14 @@ impl<'a> Array<'a> {
         let code = value_of(text, "descr").and_then(quoted).ok_or_else(|| {
             Fault::unsupported("an array of records; save one plain array of u1, u2, u4, i4, f2, f4 or f8")
         })?;
-        let all = [
-            Element::U8,
-            Element::U16,
-            Element::U32,
-            Element::I32,
-            Element::F16,
-            Element::F32,
-            Element::F64,
-        ];
+        let all = [Element::U8, Element::U16, Element::U32, Element::I32, Element::F16, Element::F32, Element::F64];
         let (order, code_only) = code.split_at_checked(1).unwrap_or(("", ""));
         let element = all
             .into_iter()
             .find(|element| element.code() == code_only && matches!(order, "<" | ">" | "|" | "="))
-            .ok_or_else(|| Fault::unsupported(format!("elements of type `{code}`; use u1, u2, u4, i4, f2, f4 or f8")))?;
+            .ok_or_else(|| {
+                Fault::unsupported(format!("elements of type `{code}`; use u1, u2, u4, i4, f2, f4 or f8"))
+            })?;
         let fortran = value_of(text, "fortran_order").ok_or_else(|| Fault::damaged("it has no `fortran_order`"))?;
         if fortran.starts_with("True") {
             return Err(Fault::unsupported("Fortran order; save it with numpy.ascontiguousarray"));
@@ -128,9 +122,9 @@ fn quoted(value: &str) -> Option<&str> {
 /// A version 1.0 header for little-endian elements; data follows at a multiple of 64 bytes.
 pub(crate) fn header(element: Element, shape: &[usize]) -> Vec<u8> {
     let order = if element == Element::U8 { '|' } else { '<' };
-    let axes: String = shape.iter().map(|axis| format!("{axis}, ")).collect();
+    let axes: Vec<String> = shape.iter().map(ToString::to_string).collect();
     // Python writes a tuple of one as `(3,)` and of two as `(3, 4)`.
-    let axes = if shape.len() == 1 { axes.trim_end() } else { axes.trim_end_matches(", ") };
+    let axes = axes.join(", ") + if shape.len() == 1 { "," } else { "" };
     let mut text = format!("{{'descr': '{order}{}', 'fortran_order': False, 'shape': ({axes}), }}", element.code());
     let padding = 63 - (10 + text.len()) % 64;
     text.extend(std::iter::repeat_n(' ', padding));

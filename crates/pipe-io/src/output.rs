@@ -77,11 +77,7 @@ fn check(target: &Target, picture: &Picture, options: &WriteOptions) -> Result<(
         let (name, w, h) = (target.format.name(), picture.width, picture.height);
         return Err(refuse(format!("{name} holds at most {largest} pixels a side, not {w}×{h}; write EXR or PNG")));
     }
-    let asked = WriteOptions {
-        pixel_type: Some(picture.sample),
-        channels: Some(picture.channels),
-        ..options.clone()
-    };
+    let asked = WriteOptions { pixel_type: Some(picture.sample), channels: Some(picture.channels), ..options.clone() };
     let form = output_form(target, &asked, None)?;
     if (form.layout, form.channels) != (picture.layout, picture.channels) {
         let (want, have) = ((form.channels, form.layout), (picture.channels, picture.layout));

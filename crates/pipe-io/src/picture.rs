@@ -186,10 +186,7 @@ pub struct Picture {
 impl Picture {
     /// Bytes that a picture of this size and type has; `None` where that overflows.
     pub fn byte_count(width: u32, height: u32, channels: Channels, sample: Sample) -> Option<usize> {
-        (width as usize)
-            .checked_mul(height as usize)?
-            .checked_mul(channels.count())?
-            .checked_mul(sample.bytes())
+        (width as usize).checked_mul(height as usize)?.checked_mul(channels.count())?.checked_mul(sample.bytes())
     }
 
     /// The value of one sample as f32: integers scaled to 0..=1, no other conversion. For tests and for single

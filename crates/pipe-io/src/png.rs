@@ -110,7 +110,12 @@ fn cicp(info: &png::Info<'_>) -> Option<Colour> {
     Some(Colour { primaries, transfer })
 }
 
-pub(crate) fn encode(out: &mut dyn Write, picture: &Picture, compression: Compression, tag_colour: bool) -> Result<(), Fault> {
+pub(crate) fn encode(
+    out: &mut dyn Write,
+    picture: &Picture,
+    compression: Compression,
+    tag_colour: bool,
+) -> Result<(), Fault> {
     let mut encoder = png::Encoder::new(out, picture.width, picture.height);
     encoder.set_color(match picture.channels {
         Channels::Y => png::ColorType::Grayscale,

@@ -199,14 +199,12 @@ pub(crate) fn encode(
         _ => return Err(Fault::Form(format!("{} cannot hold these pixels", format.name()))),
     };
     match format {
-        Format::Jpeg => {
-            JpegEncoder::new_with_quality(out, quality).write_image(&picture.bytes, width, height, kind)
-        }
+        Format::Jpeg => JpegEncoder::new_with_quality(out, quality).write_image(&picture.bytes, width, height, kind),
         Format::WebP => WebPEncoder::new_lossless(out).write_image(&picture.bytes, width, height, kind),
         Format::Hdr => HdrEncoder::new(out).write_image(&representable(&picture.bytes), width, height, kind),
         _ => {
-            let mut encoder = qoi::Encoder::new(&picture.bytes, width, height)
-                .map_err(|error| Fault::Form(error.to_string()))?;
+            let mut encoder =
+                qoi::Encoder::new(&picture.bytes, width, height).map_err(|error| Fault::Form(error.to_string()))?;
             if picture.colour == Colour::LINEAR_REC709 {
                 encoder = encoder.with_colorspace(qoi::ColorSpace::Linear);
             }
@@ -227,8 +225,8 @@ fn representable(bytes: &[u8]) -> std::borrow::Cow<'_, [u8]> {
     if values.iter().all(|&value| (0.0..=LARGEST).contains(&f32::from_ne_bytes(value))) {
         return bytes.into();
     }
-    // `max` and `min` prefer the number to a NaN.
-    values.iter().flat_map(|&value| f32::from_ne_bytes(value).max(0.0).min(LARGEST).to_ne_bytes()).collect()
+    let nearest = |value: f32| if value > 0.0 { value.min(LARGEST) } else { 0.0 };
+    values.iter().flat_map(|&value| nearest(f32::from_ne_bytes(value)).to_ne_bytes()).collect()
 }
 
 fn fault(error: ImageError) -> Fault {

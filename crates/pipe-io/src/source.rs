@@ -37,17 +37,8 @@ pub enum Format {
 
 impl Format {
     /// Every format.
-    pub const ALL: [Self; 9] = [
-        Self::Exr,
-        Self::Png,
-        Self::Jpeg,
-        Self::Tiff,
-        Self::Hdr,
-        Self::Pfm,
-        Self::WebP,
-        Self::Qoi,
-        Self::Npy,
-    ];
+    pub const ALL: [Self; 9] =
+        [Self::Exr, Self::Png, Self::Jpeg, Self::Tiff, Self::Hdr, Self::Pfm, Self::WebP, Self::Qoi, Self::Npy];
 
     /// The format's own name.
     pub const fn name(self) -> &'static str {
@@ -212,10 +203,8 @@ impl Target {
             return Ok(Self { path: None, format: Format::Png });
         }
         let path = PathBuf::from(text);
-        let format = Format::of_extension(Path::new(text)).ok_or_else(|| Error::UnknownExtension {
-            file: text.to_owned(),
-            known: Format::known_extensions(),
-        })?;
+        let format = Format::of_extension(Path::new(text))
+            .ok_or_else(|| Error::UnknownExtension { file: text.to_owned(), known: Format::known_extensions() })?;
         Ok(Self { path: (path.file_stem() != Some("-".as_ref())).then_some(path), format })
     }
 }

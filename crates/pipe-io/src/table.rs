@@ -66,10 +66,7 @@ impl Notation {
             "csv" => Ok(Self::Csv),
             "json" => Ok(Self::Json),
             "npy" => Ok(Self::Npy),
-            _ => Err(Error::UnknownExtension {
-                file: path.display().to_string(),
-                known: ".csv .json .npy".to_owned(),
-            }),
+            _ => Err(Error::UnknownExtension { file: path.display().to_string(), known: ".csv .json .npy".to_owned() }),
         }
     }
 }

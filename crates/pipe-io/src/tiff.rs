@@ -161,11 +161,7 @@ fn interleave(picture: Picture) -> Picture {
     Picture { layout: Layout::Interleaved, bytes, ..picture }
 }
 
-pub(crate) fn encode(
-    out: &mut (impl Write + Seek),
-    picture: &Picture,
-    compression: Compression,
-) -> Result<(), Fault> {
+pub(crate) fn encode(out: &mut (impl Write + Seek), picture: &Picture, compression: Compression) -> Result<(), Fault> {
     let mut encoder = TiffEncoder::new(out).map_err(failure)?.with_compression(match compression {
         Compression::Lzw => tiff::encoder::Compression::Lzw,
         Compression::Deflate => tiff::encoder::Compression::Deflate(DeflateLevel::default()),

@@ -48,8 +48,7 @@ impl Attributes {
 
     /// Name and value of every attribute, as text, sorted by name.
     pub fn list(&self) -> Vec<(String, String)> {
-        let channels = Default::default();
-        let bare = self.apply(Part::new(exr::prelude::Text::default(), (1, 1), channels));
+        let bare = self.apply(Part::new(exr::prelude::Text::default(), (1, 1), std::iter::empty().collect()));
         let mut list: Vec<_> = bare
             .all_named_attributes()
             .filter(|(name, _)| !LAYOUT.contains(name))

@@ -24,7 +24,8 @@ pub(super) fn read(opened: &Opened, bytes: &[u8], limits: &Limits) -> Result<Vec
         return Err(Fault::unsupported("chroma that is not subsampled by two both ways; save it as RGB"));
     }
     let data = opened.data;
-    if data.x % 2 != 0 || data.y % 2 != 0 || data.width % 2 != 0 || data.height % 2 != 0 {
+    let even = data.x % 2 == 0 && data.y % 2 == 0;
+    if !even || !data.width.is_multiple_of(2) || !data.height.is_multiple_of(2) {
         return Err(Fault::damaged("its chroma is subsampled by two, but its data window is odd"));
     }
     limits.check(data.width.into(), data.height.into(), 16)?;

@@ -39,9 +39,9 @@ pub(super) fn read(
     let grid = Grid::new(opened, part);
     let offsets = grid.offsets(opened, bytes)?;
     let bands = split(&grid, &planes, &mut pixels, opened.data, view);
-    bands.into_par_iter().try_for_each(|band| {
-        shielded(|| band.decode(opened, bytes, &grid, &offsets, &planes, sample, view))
-    })?;
+    bands
+        .into_par_iter()
+        .try_for_each(|band| shielded(|| band.decode(opened, bytes, &grid, &offsets, &planes, sample, view)))?;
     Ok(pixels)
 }
 
@@ -287,7 +287,8 @@ fn decompress_subsampled(part: &Part, chunk: Chunk, width: usize, ys: Range<usiz
         return Err(Fault::damaged("its tiles have subsampled channels, which EXR forbids"));
     };
     let list = &part.channels.list;
-    let size: usize = ys.clone().flat_map(|y| list.iter().filter_map(move |channel| line_bytes(channel, width, y))).sum();
+    let size: usize =
+        ys.clone().flat_map(|y| list.iter().filter_map(move |channel| line_bytes(channel, width, y))).sum();
     let height = ys.len();
     let bytewise = matches!(
         part.compression,
@@ -301,9 +302,9 @@ fn decompress_subsampled(part: &Part, chunk: Chunk, width: usize, ys: Range<usiz
         );
         alone.layer_size = Vec2(size / 2, 1);
     } else {
-        let divisible = list.iter().all(|channel| {
-            width.is_multiple_of(channel.sampling.0) && ys.start.is_multiple_of(channel.sampling.1)
-        });
+        let divisible = list
+            .iter()
+            .all(|channel| width.is_multiple_of(channel.sampling.0) && ys.start.is_multiple_of(channel.sampling.1));
         if !divisible || !size.is_multiple_of(width * height) {
             return Err(Fault::unsupported("chroma subsampling of this kind; save it as RGB"));
         }

@@ -60,25 +60,25 @@ pub(super) fn all(parts: &[Part]) -> Vec<Layer> {
 
 /// The layer that `wanted` means; without a name the first unprefixed colours, else the first colours, else the first.
 pub(super) fn choose(layers: &[Layer], parts: &[Part], wanted: Option<&str>) -> Result<Layer, Fault> {
-    let chosen = match wanted {
-        Some(wanted) => named(layers, wanted).cloned().or_else(|| single_channel(parts, wanted)).ok_or_else(|| {
-            let available = layers.iter().map(|layer| match layer.label.as_str() {
+    let chosen = if let Some(wanted) = wanted {
+        let found = named(layers, wanted).cloned().or_else(|| single_channel(parts, wanted));
+        found.ok_or_else(|| {
+            let labels = layers.iter().map(|layer| match layer.label.as_str() {
                 "" => "(the unnamed one)".to_owned(),
                 label => format!("`{label}`"),
             });
-            Fault::NoSuchLayer { wanted: wanted.to_owned(), available: available.collect::<Vec<_>>().join(", ") }
-        })?,
-        None => {
-            let colour = |layer: &&Layer| layer.meaning != Meaning::Values && layer.obstacle.is_none();
-            layers
-                .iter()
-                .find(|layer| layer.unprefixed && colour(layer))
-                .or_else(|| layers.iter().find(colour))
-                .or_else(|| layers.iter().find(|layer| layer.obstacle.is_none()))
-                .or(layers.first())
-                .cloned()
-                .ok_or_else(|| Fault::damaged("it has no channels"))?
-        }
+            let available = labels.collect::<Vec<_>>().join(", ");
+            Fault::NoSuchLayer { wanted: wanted.to_owned(), available }
+        })?
+    } else {
+        let colour = |layer: &&Layer| layer.meaning != Meaning::Values && layer.obstacle.is_none();
+        let default = layers
+            .iter()
+            .find(|layer| layer.unprefixed && colour(layer))
+            .or_else(|| layers.iter().find(colour))
+            .or_else(|| layers.iter().find(|layer| layer.obstacle.is_none()))
+            .or(layers.first());
+        default.cloned().ok_or_else(|| Fault::damaged("it has no channels"))?
     };
     match chosen.obstacle {
         Some(obstacle) => Err(Fault::unsupported(obstacle)),
@@ -165,9 +165,7 @@ fn pick(part: &Part, prefix: &str) -> (Meaning, Vec<Option<usize>>, Option<Strin
         2 | 3 => (Meaning::Colour, with_alpha(vec![r, g, b])),
         1 => (Meaning::Values, with_alpha(vec![r.or(g).or(b)])),
         _ => match (x, y, z, find(&["ry"]), find(&["by"])) {
-            (_, Some(_), _, Some(ry), Some(by)) => {
-                (Meaning::LuminanceChroma, with_alpha(vec![y, Some(ry), Some(by)]))
-            }
+            (_, Some(_), _, Some(ry), Some(by)) => (Meaning::LuminanceChroma, with_alpha(vec![y, Some(ry), Some(by)])),
             // A vector's components. Without an X, a Y is luminance, and a Z beside it is depth.
             (Some(_), Some(_), ..) => (Meaning::Values, vec![x, y, z]),
             (_, Some(_), ..) => (Meaning::Colour, with_alpha(vec![y])),
@@ -179,7 +177,8 @@ fn pick(part: &Part, prefix: &str) -> (Meaning, Vec<Option<usize>>, Option<Strin
                     2 => (Meaning::Values, [others, vec![None]].concat()),
                     3 => (Meaning::Values, others),
                     _ => {
-                        let names: Vec<_> = members.iter().map(|(i, _)| part.channels.list[*i].name.to_string()).collect();
+                        let names: Vec<_> =
+                            members.iter().map(|(i, _)| part.channels.list[*i].name.to_string()).collect();
                         let names = names.join(", ");
                         let reason = format!("a layer of the channels {names}; choose one of them after a `#`");
                         return (Meaning::Values, others, Some(reason));
