@@ -130,6 +130,22 @@ fn lossy_formats_stay_near() {
 }
 
 #[test]
+fn lying_counters_of_a_block_abort_nothing() {
+    let options = options(Sample::F16, Channels::Rgb, Some(Compression::Dwaa));
+    let good = encode(&target(Format::Exr), &picture(&target(Format::Exr), &options), &options).unwrap();
+    // Two blocks of 32 lines: the table's first entry points just behind the table.
+    let entry = |at: &usize| u64::from_le_bytes(*good[*at..].first_chunk().unwrap()) == *at as u64 + 16;
+    let first_block = (8..good.len() - 8).find(entry).unwrap() + 16;
+    for counter in 1..10 {
+        let mut bad = good.clone();
+        let at = first_block + 8 + counter * 8;
+        bad[at..at + 8].copy_from_slice(&(u64::MAX >> 4).to_le_bytes());
+        let input = Input::from_bytes(&Source::file("memory"), bad, &ReadOptions::default()).unwrap();
+        assert!(input.read().is_err(), "counter {counter}");
+    }
+}
+
+#[test]
 fn radiance_keeps_eight_bits_of_mantissa() {
     let mut before = picture(&target(Format::Hdr), &WriteOptions::default());
     for value in before.bytes.as_chunks_mut::<4>().0 {

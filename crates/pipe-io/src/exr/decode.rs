@@ -272,10 +272,37 @@ fn copy(line: &[u8], from: SampleType, target: &mut [u8], to: Sample) {
 
 /// Decompresses one block of `width` columns and the rows `ys`.
 fn decompress(meta: &MetaData, part: &Part, chunk: Chunk, width: usize, ys: Range<usize>) -> Result<Vec<u8>, Fault> {
+    if let (Compression::DWAA(_) | Compression::DWAB(_), Some(packed)) = (part.compression, packed_bytes(&chunk)) {
+        let padded = (width + 7) * (ys.len() + 7) * part.channels.bytes_per_pixel;
+        check_dwa_counters(packed, width * ys.len() * part.channels.bytes_per_pixel, padded)?;
+    }
     if part.channels.list.iter().all(|channel| channel.sampling == Vec2(1, 1)) {
         return Ok(UncompressedBlock::decompress_chunk(chunk, meta, false).map_err(fault)?.data);
     }
     decompress_subsampled(part, chunk, width, ys)
+}
+
+fn packed_bytes(chunk: &Chunk) -> Option<&[u8]> {
+    match &chunk.compressed_block {
+        CompressedBlock::Tile(block) => Some(&block.compressed_pixels_le),
+        CompressedBlock::ScanLine(block) => Some(&block.compressed_pixels_le),
+        _ => None,
+    }
+}
+
+/// A DWA block begins with the sizes of its sections, which the `exr` crate allocates without a second look: one
+/// changed byte asks for an exabyte and aborts the process. `raw` is the size of the block when stored uncompressed
+/// (it has no such header then), `padded` that of its 8×8 blocks.
+fn check_dwa_counters(packed: &[u8], raw: usize, padded: usize) -> Result<(), Fault> {
+    if packed.len() == raw {
+        return Ok(());
+    }
+    let counters = packed.get(..88).ok_or_else(|| Fault::damaged("a block is too short"))?.as_chunks::<8>().0;
+    // By index: 1, 6, 7 sizes of unpacked sections (run lengths may expand a little); 8, 9 counts of u16;
+    // 2 to 5 sizes of packed sections.
+    let largest = |index: usize| if (2..=5).contains(&index) { packed.len() } else { 2 * padded + 1024 };
+    let plausible = (1..10).all(|index| u64::from_le_bytes(counters[index]) <= largest(index) as u64);
+    if plausible { Ok(()) } else { Err(Fault::damaged("a block declares sections larger than itself")) }
 }
 
 /// The `exr` crate reads subsampled headers and its codecs handle subsampled channels, but its block level computes

@@ -108,6 +108,11 @@ impl Opened {
         let (data, display) = (window(part.data_window())?, window(part.shared_attributes.display_window)?);
         let all_channels = part.channels.bytes_per_pixel as u64;
         limits.check(data.width.into(), data.height.into(), all_channels)?;
+        let raw = u128::from(data.width) * u128::from(data.height) * u128::from(all_channels);
+        let subsampled = part.channels.list.iter().any(|channel| channel.sampling != exr::math::Vec2(1, 1));
+        if largest_ratio(part.compression).is_some_and(|ratio| !subsampled && raw > u128::from(length) * ratio) {
+            return Err(Fault::damaged(format!("{length} bytes cannot hold the {raw} bytes of pixels it declares")));
+        }
         limits.check(display.width.into(), display.height.into(), layer.channels.len() as u64 * 4)?;
         if matches!(part.compression, exr::prelude::Compression::HTJ2K32 | exr::prelude::Compression::HTJ2K256) {
             return Err(Fault::unsupported("HTJ2K compression; save it with ZIP or PIZ"));
@@ -182,6 +187,20 @@ impl Opened {
             Primaries { red: wide(xy.red), green: wide(xy.green), blue: wide(xy.blue), white: wide(xy.white) };
         // A file with senseless chromaticities (all zero is common) is taken for the default, as OpenEXR does.
         if primaries.to_xyz().is_some() { primaries.snapped() } else { Primaries::REC709 }
+    }
+}
+
+/// How many bytes of pixels one byte of a file can stand for at most; `None` where there is no useful bound.
+const fn largest_ratio(compression: exr::prelude::Compression) -> Option<u128> {
+    use exr::prelude::Compression::{B44, B44A, PXR24, RLE, Uncompressed, ZIP1, ZIP16};
+    match compression {
+        Uncompressed => Some(1),
+        // A flat block of 32 bytes takes 3.
+        B44 | B44A => Some(11),
+        RLE => Some(64),
+        // Deflate ends at 1032; PXR24 leaves out a fourth of each float.
+        ZIP1 | ZIP16 | PXR24 => Some(1400),
+        _ => None,
     }
 }
 
