@@ -438,6 +438,10 @@ impl<'de> de::Deserializer<'de> for TreeDeserializer<'_> {
         if name == Driven::TOKEN || name == Operand::TOKEN {
             return match &self.tree.value {
                 Syntax::Text(text) if !text.starts_with('=') => visitor.visit_u64(self.edge(name)?),
+                // A field that also takes a bare name (`Otsu`) reads it by a visitor of its own.
+                Syntax::Tuple(Some(bare), values) if values.is_empty() => {
+                    visitor.visit_str(&bare.value).map_err(|_: Error| self.wrong("a number"))
+                }
                 _ => visitor.visit_f64(self.number()?),
             };
         }

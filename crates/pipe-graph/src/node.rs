@@ -280,6 +280,8 @@ pub struct Kind {
     pub examples: &'static [&'static str],
     /// Promised agreement with the reference on finite input.
     pub tolerance: Tolerance,
+    /// Whether it may make alpha other than 1 from opaque images: such a graph writes alpha to its outputs.
+    pub sets_alpha: bool,
     /// JSON schema of the fields.
     pub schema: fn() -> Schema,
     /// Reads the fields.
@@ -298,6 +300,7 @@ impl Kind {
             ports: &[("out", "the result")],
             examples,
             tolerance: Tolerance::FLOAT,
+            sets_alpha: false,
             schema: || schema_for!(T),
             build: |d| T::deserialize(d).map(|node| Box::new(node) as Box<dyn Node>),
         }
@@ -307,6 +310,13 @@ impl Kind {
     #[must_use]
     pub const fn ports(mut self, ports: &'static [(&'static str, &'static str)]) -> Self {
         self.ports = ports;
+        self
+    }
+
+    /// A kind that may make alpha.
+    #[must_use]
+    pub const fn sets_alpha(mut self) -> Self {
+        self.sets_alpha = true;
         self
     }
 
@@ -321,6 +331,7 @@ impl Kind {
             ports: &[],
             examples,
             tolerance: Tolerance::EXACT,
+            sets_alpha: false,
             schema: || schema_for!(T),
             build: |_| Err(serde::de::Error::custom("the resolver takes this kind apart")),
         }

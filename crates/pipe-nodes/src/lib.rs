@@ -13,6 +13,7 @@ pub mod analysis;
 pub mod colour;
 pub mod composite;
 pub mod filters;
+pub mod reference;
 pub mod simulation;
 pub mod sources;
 pub mod structure;

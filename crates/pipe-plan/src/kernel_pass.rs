@@ -42,6 +42,16 @@ pub(crate) struct Stage {
     pub(crate) shape: Shape,
 }
 
+impl Stage {
+    /// Width and height of an image result.
+    pub(crate) fn shape_size(&self) -> Option<[u32; 2]> {
+        match self.shape {
+            Shape::Image(t) => Some(t.size),
+            _ => None,
+        }
+    }
+}
+
 /// An output of a pass.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct PassWrite {

@@ -10,6 +10,7 @@
 mod allocate;
 mod compose;
 mod error;
+mod fuse;
 mod kernel_pass;
 pub mod lower;
 pub mod plan;
@@ -37,10 +38,56 @@ impl Default for Options {
     }
 }
 
+/// A phase whose result `pipe plan --after` shows.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Phase {
+    /// What the nodes declared.
+    Lower,
+    /// Without what nobody needs.
+    Prune,
+    /// With passes put together, and why others were not.
+    Fuse,
+    /// In the order in which they will run.
+    Schedule,
+}
+
+impl std::str::FromStr for Phase {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        match text {
+            "lower" => Ok(Self::Lower),
+            "prune" => Ok(Self::Prune),
+            "fuse" => Ok(Self::Fuse),
+            "schedule" => Ok(Self::Schedule),
+            _ => Err(format!("there is no phase `{text}`\n  next: expected lower, prune, fuse or schedule")),
+        }
+    }
+}
+
+/// What there is after a phase, for people.
+pub fn after(graph: PassGraph, phase: Phase, fuse: bool, limits: &Limits) -> String {
+    let ops = kernel_pass::Ops::new(graph);
+    if phase == Phase::Lower {
+        return print::ops(&ops);
+    }
+    let ops = prune::prune(ops);
+    if phase == Phase::Prune {
+        return print::ops(&ops);
+    }
+    let (ops, decisions) = if fuse { fuse::fuse(ops, limits) } else { (ops, Vec::new()) };
+    if phase == Phase::Fuse {
+        let lines: String = decisions.iter().map(|d| format!("{d}\n")).collect();
+        return format!("{}\n{lines}", print::ops(&ops));
+    }
+    print::ops(&schedule::schedule(ops).ops)
+}
+
 /// Plans a pass graph for a device.
 pub fn plan(name: &str, graph: PassGraph, limits: &Limits, options: &Options) -> Result<Plan, PlanError> {
     let ops = kernel_pass::Ops::new(graph);
     let ops = prune::prune(ops);
+    let ops = if options.fuse { fuse::fuse(ops, limits).0 } else { ops };
     let schedule = schedule::schedule(ops);
     allocate::allocate(name, schedule, limits, options)
 }

@@ -2,9 +2,11 @@
 
 use std::fmt::Write as _;
 
+use pipe_graph::pass::ResourceId;
 use pipe_graph::types::{ImageType, Precision, VolumeType};
 use serde_json::{Value, json};
 
+use crate::kernel_pass::{Op, Ops};
 use crate::plan::{Plan, Repeat, Run, Step, Storage, Times};
 
 /// One launch with the loops around it.
@@ -205,6 +207,33 @@ impl Plan {
         out.push_str("</svg>\n");
         out
     }
+}
+
+/// Passes before slots are known.
+pub(crate) fn ops(ops: &Ops) -> String {
+    fn walk(list: &[Op], ops: &Ops, depth: usize, out: &mut String) {
+        let indent = "  ".repeat(depth);
+        let names = |ids: &mut dyn Iterator<Item = ResourceId>| -> String {
+            ids.map(|id| ops.resources[id.index()].name.clone()).collect::<Vec<_>>().join(", ")
+        };
+        for op in list {
+            match op {
+                Op::Pass(p) => {
+                    let shaders: Vec<&str> = p.stages.iter().map(|s| &*s.shader.path).collect();
+                    let reads = names(&mut p.reads.iter().copied().chain(p.drivers()));
+                    let writes = names(&mut p.writes.iter().map(|w| w.resource));
+                    let _ = writeln!(out, "{indent}{}  ({})  {reads} -> {writes}", p.name, shaders.join(" + "));
+                }
+                Op::Loop(l) => {
+                    let _ = writeln!(out, "{indent}{}  {:?}", l.name, l.count);
+                    walk(&l.body, ops, depth + 1, out);
+                }
+            }
+        }
+    }
+    let mut out = String::new();
+    walk(&ops.ops, ops, 0, &mut out);
+    out
 }
 
 fn describe(times: &Times) -> String {

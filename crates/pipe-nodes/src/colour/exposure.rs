@@ -7,7 +7,7 @@ use crate::shader;
 /// Brightens or darkens by stops, as the shutter of a camera would: rgb·2^ev. Alpha is kept.
 #[derive(Debug, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(default)]
-pub struct Exposure {
+pub(super) struct Exposure {
     /// The image to expose.
     image: In<Image>,
     /// Stops: each doubles the light.
@@ -15,7 +15,7 @@ pub struct Exposure {
     ev: Driven,
 }
 
-pub(crate) const KIND: Kind = Kind::of::<Exposure>(
+pub(super) const KIND: Kind = Kind::of::<Exposure>(
     "Exposure",
     Category::Colour,
     &[r#"Exposure(image: "in", ev: 1.5)"#, r#"Exposure(image: "in", ev: "scalar")"#, r#"Exposure(image: "grey", ev: -2)"#],

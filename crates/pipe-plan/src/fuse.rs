@@ -1,0 +1,386 @@
+//! Fewer passes: producers are put into the kernels of their consumers.
+//!
+//! A pass P may be put into a pass C that reads its result r when
+//!
+//! - P computes pixel by pixel (`Point`) with a single result, and only C needs r (it is neither fetched, kept, a loop's
+//!   state, nor read elsewhere): so r need never exist;
+//! - C reads r at few places for each pixel that it makes: the same one (`Point`), or a small neighbourhood when P costs
+//!   next to nothing. What a row of taps would recompute again and again is better stored once;
+//! - r is stored in full precision: a half-float image that the user asked for rounds its values, and goes on to;
+//! - the kernel stays within the device's bindings.
+//!
+//! Point passes that share an input, or that feed several Point passes, are put side by side into one kernel with
+//! several outputs, when no way leads from one to the other through a pass outside. So chains, trees and diamonds of
+//! point passes become one kernel, decoding of a file joins what first uses the pixels, and packing for a file joins
+//! what made them.
+//!
+//! Equal passes over equal inputs are computed once. Every decision is recorded for `pipe plan --after fuse`.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use pipe_graph::pass::{Access, Count, Entry, Grid, Limits, Reach, ResourceId, Shape};
+use pipe_graph::types::Precision;
+
+use crate::kernel_pass::{KernelPass, LoopOp, Op, Ops, Source};
+
+/// Most loads that a stencil may make of a value that is computed anew for each.
+const MOST_TAPS: u32 = 9;
+
+/// Most stages of one kernel: beyond, registers run out before bandwidth does.
+const MOST_STAGES: usize = 24;
+
+/// Fuses every region.
+pub(crate) fn fuse(mut ops: Ops, limits: &Limits) -> (Ops, Vec<String>) {
+    let mut log = Vec::new();
+    let wanted: BTreeSet<ResourceId> = ops.wanted().collect();
+    let list = std::mem::take(&mut ops.ops);
+    let list = region(list, &ops, &wanted, limits, &mut log);
+    ops.ops = list;
+    (ops, log)
+}
+
+fn region(list: Vec<Op>, ops: &Ops, outside: &BTreeSet<ResourceId>, limits: &Limits, log: &mut Vec<String>) -> Vec<Op> {
+    let inner = |l: LoopOp, log: &mut Vec<String>| {
+        let mut needed: BTreeSet<ResourceId> = l.states.iter().flat_map(|s| [s.next, s.carried]).collect();
+        if let Count::Until { value, .. } = l.count {
+            needed.insert(value);
+        }
+        LoopOp { body: region(l.body, ops, &needed, limits, log), ..l }
+    };
+    let list: Vec<Op> = list
+        .into_iter()
+        .map(|op| match op {
+            Op::Loop(l) => Op::Loop(inner(l, log)),
+            pass @ Op::Pass(_) => pass,
+        })
+        .collect();
+    let mut fusion = Fusion { list: share_equal(list, outside, log), ops, outside, limits, log };
+    while fusion.fold_one() {}
+    while fusion.join_one() {}
+    // What was joined may have become foldable.
+    while fusion.fold_one() {}
+    fusion.list
+}
+
+/// Equal passes over equal inputs become one.
+fn share_equal(list: Vec<Op>, outside: &BTreeSet<ResourceId>, log: &mut Vec<String>) -> Vec<Op> {
+    let mut renamed: BTreeMap<ResourceId, ResourceId> = BTreeMap::new();
+    let mut kept: Vec<Op> = Vec::with_capacity(list.len());
+    for mut op in list {
+        rename(&mut op, &renamed);
+        if let Op::Pass(pass) = &op {
+            let free = pass.writes.iter().all(|w| !outside.contains(&w.resource) && w.in_place_of.is_none());
+            let twin = kept.iter().find_map(|other| match other {
+                Op::Pass(other) if free && same_work(pass, other) => Some(other),
+                _ => None,
+            });
+            if let Some(twin) = twin {
+                log.push(format!("{} is {} once more: computed once", pass.name, twin.name));
+                for (w, t) in pass.writes.iter().zip(&twin.writes) {
+                    renamed.insert(w.resource, t.resource);
+                }
+                continue;
+            }
+        }
+        kept.push(op);
+    }
+    kept
+}
+
+fn same_work(a: &KernelPass, b: &KernelPass) -> bool {
+    let ports = |p: &KernelPass| -> Vec<(String, Access)> { p.writes.iter().map(|w| (w.port.clone(), w.access)).collect() };
+    a.stages == b.stages && a.reads == b.reads && a.grid == b.grid && ports(a) == ports(b) && b.writes.iter().all(|w| w.in_place_of.is_none())
+}
+
+fn rename(op: &mut Op, names: &BTreeMap<ResourceId, ResourceId>) {
+    let to = |id: &mut ResourceId| {
+        if let Some(new) = names.get(id) {
+            *id = *new;
+        }
+    };
+    match op {
+        Op::Pass(p) => {
+            p.reads.iter_mut().for_each(to);
+            p.writes.iter_mut().filter_map(|w| w.in_place_of.as_mut()).for_each(to);
+            for stage in &mut p.stages {
+                for value in stage.params.values_mut() {
+                    if let pipe_graph::pass::Value::Driven(id) = value {
+                        to(id);
+                    }
+                }
+            }
+        }
+        Op::Loop(l) => {
+            for s in &mut l.states {
+                to(&mut s.init);
+                to(&mut s.next);
+            }
+            l.body.iter_mut().for_each(|op| rename(op, names));
+        }
+    }
+}
+
+struct Fusion<'a> {
+    list: Vec<Op>,
+    ops: &'a Ops,
+    outside: &'a BTreeSet<ResourceId>,
+    limits: &'a Limits,
+    log: &'a mut Vec<String>,
+}
+
+impl Fusion<'_> {
+    fn pass(&self, i: usize) -> Option<&KernelPass> {
+        match &self.list[i] {
+            Op::Pass(p) => Some(p),
+            Op::Loop(_) => None,
+        }
+    }
+
+    /// Operations that need a resource.
+    fn readers(&self, id: ResourceId) -> Vec<usize> {
+        (0..self.list.len()).filter(|i| self.list[*i].sources().contains(&id)).collect()
+    }
+
+    /// Puts one producer into its only consumer; `false` when there is none left.
+    fn fold_one(&mut self) -> bool {
+        for p in 0..self.list.len() {
+            let Some(producer) = self.pass(p) else { continue };
+            let Some(result) = foldable(producer, self.ops) else { continue };
+            if self.outside.contains(&result) {
+                continue;
+            }
+            let readers = self.readers(result);
+            let [c] = readers[..] else { continue };
+            let Some(consumer) = self.pass(c) else { continue };
+            match self.may_fold(producer, consumer, result) {
+                Ok(()) => {
+                    let fused = fold(producer, consumer, result);
+                    if within_limits(&fused, self.ops, self.limits) {
+                        self.note(format!("{} is computed inside {}", producer.name.clone(), consumer.name.clone()));
+                        self.list[c] = Op::Pass(fused);
+                        self.list.remove(p);
+                        return true;
+                    }
+                    let note = format!("{} stays before {}: together they bind more than the device allows", producer.name, consumer.name);
+                    self.note(note);
+                }
+                Err(why) => {
+                    let note = format!("{} stays before {}: {why}", producer.name, consumer.name);
+                    self.note(note);
+                }
+            }
+        }
+        false
+    }
+
+    fn note(&mut self, text: String) {
+        if !self.log.contains(&text) {
+            self.log.push(text);
+        }
+    }
+
+    fn may_fold(&self, producer: &KernelPass, consumer: &KernelPass, result: ResourceId) -> Result<(), String> {
+        if producer.stages.len() + consumer.stages.len() > MOST_STAGES {
+            return Err("the kernel would be too long".into());
+        }
+        if matches!(self.ops.shape(result), Shape::Image(t) if t.precision == Precision::F16) {
+            return Err("it is stored in half precision, which rounds".into());
+        }
+        if consumer.last().entry == Entry::Points {
+            return Err("points are drawn from stored images".into());
+        }
+        let at = consumer.reads.iter().position(|r| *r == result).ok_or("it is read by a parameter only")?;
+        let mut taps = 0;
+        for port in consumer.stages.iter().flat_map(|s| &s.ports).filter(|p| p.source == Source::Read(at)) {
+            taps += match port.reach {
+                Reach::Point => 1,
+                Reach::Around(x, y) => (2 * x + 1).saturating_mul(2 * y + 1),
+                Reach::Whole => return Err("it is read from anywhere".into()),
+            };
+        }
+        // Ports apply their border before they ask for a value, so a producer is never asked for one outside.
+        // Decoding a file's words or looking into a table is not next to nothing.
+        let ports = || producer.stages.iter().flat_map(|s| &s.ports);
+        let cheap = ports().count() <= 1 && ports().all(|p| matches!(p.shape, Shape::Image(_)));
+        if taps > 1 && (taps > MOST_TAPS || !cheap) {
+            return Err(format!("it would be computed {taps} times for each pixel"));
+        }
+        Ok(())
+    }
+
+    /// Puts two Point passes over the same grid side by side, when they share an input or one feeds the other.
+    fn join_one(&mut self) -> bool {
+        for a in 0..self.list.len() {
+            for b in a + 1..self.list.len() {
+                let (Some(first), Some(second)) = (self.pass(a), self.pass(b)) else { continue };
+                if !is_points(first) || !is_points(second) || first.last().shape_size() != second.last().shape_size() {
+                    continue;
+                }
+                let feeds = second.reads.iter().any(|r| first.writes.iter().any(|w| w.resource == *r));
+                let image = |r: &ResourceId| matches!(self.ops.shape(*r), Shape::Image(_));
+                let shares = first.reads.iter().any(|r| image(r) && second.reads.contains(r));
+                if !(feeds || shares) || first.stages.len() + second.stages.len() > MOST_STAGES {
+                    continue;
+                }
+                let half = |p: &KernelPass| p.writes.iter().any(|w| matches!(self.ops.shape(w.resource), Shape::Image(t) if t.precision == Precision::F16));
+                if feeds && half(first) {
+                    continue;
+                }
+                // Something between the two that needs the first and feeds the second keeps them apart.
+                if self.way_between(a, b) {
+                    continue;
+                }
+                let joined = join(first, second);
+                if within_limits(&joined, self.ops, self.limits) {
+                    let note = format!("{} and {} run in one kernel", first.name, second.name);
+                    self.note(note);
+                    // It stands where the second stood: everything that the second needs is there, and nothing between
+                    // needs the first.
+                    if self.needed_between(a, b) {
+                        continue;
+                    }
+                    self.list[b] = Op::Pass(joined);
+                    self.list.remove(a);
+                    return true;
+                }
+            }
+        }
+        false
+    }
+
+    /// Whether some operation between `a` and `b` depends on `a` and `b` depends on it.
+    fn way_between(&self, a: usize, b: usize) -> bool {
+        let mut tainted: BTreeSet<ResourceId> = self.list[a].results().into_iter().collect();
+        let own = tainted.clone();
+        for i in a + 1..b {
+            if self.list[i].sources().iter().any(|s| tainted.contains(s)) {
+                tainted.extend(self.list[i].results());
+            }
+        }
+        self.list[b].sources().iter().any(|s| tainted.contains(s) && !own.contains(s))
+    }
+
+    /// Whether something between `a` and `b` reads what `a` makes.
+    fn needed_between(&self, a: usize, b: usize) -> bool {
+        let own = self.list[a].results();
+        (a + 1..b).any(|i| self.list[i].sources().iter().any(|s| own.contains(s)))
+    }
+}
+
+/// Whether a pass is made of Point stages only.
+fn is_points(pass: &KernelPass) -> bool {
+    pass.grid == Grid::Cover
+        && pass.stages.iter().all(|s| s.entry == Entry::Point)
+        && pass.writes.iter().all(|w| w.access == Access::Store && w.in_place_of.is_none())
+}
+
+/// The single image that a Point pass makes.
+fn foldable(pass: &KernelPass, ops: &Ops) -> Option<ResourceId> {
+    match pass.writes.as_slice() {
+        [one] if is_points(pass) && matches!(ops.shape(one.resource), Shape::Image(_)) => Some(one.resource),
+        _ => None,
+    }
+}
+
+/// The consumer with the producer's stages in front.
+fn fold(producer: &KernelPass, consumer: &KernelPass, result: ResourceId) -> KernelPass {
+    let mut fused = stack(producer, consumer);
+    let offset = producer.stages.len();
+    let value = producer.writes[0].stage;
+    let at = fused.reads.iter().position(|r| *r == result);
+    for stage in &mut fused.stages[offset..] {
+        for port in &mut stage.ports {
+            if at.is_some_and(|at| port.source == Source::Read(at)) {
+                port.source = Source::Stage(value);
+            }
+        }
+    }
+    fused.writes.retain(|w| w.resource != result);
+    drop_unread(&mut fused);
+    fused.grid = consumer.grid;
+    fused.name = join_names(&producer.name, &consumer.name);
+    fused
+}
+
+/// Both passes in one kernel; what the first makes and the second reads is passed on directly.
+fn join(first: &KernelPass, second: &KernelPass) -> KernelPass {
+    let mut joined = stack(first, second);
+    let offset = first.stages.len();
+    for write in &first.writes {
+        let Some(at) = joined.reads.iter().position(|r| *r == write.resource) else { continue };
+        for stage in &mut joined.stages[offset..] {
+            for port in &mut stage.ports {
+                if port.source == Source::Read(at) {
+                    port.source = Source::Stage(write.stage);
+                }
+            }
+        }
+    }
+    drop_unread(&mut joined);
+    joined.name = join_names(&first.name, &second.name);
+    joined
+}
+
+fn join_names(a: &str, b: &str) -> String {
+    format!("{a}+{b}")
+}
+
+/// The stages of both, reads made distinct, writes of both.
+fn stack(first: &KernelPass, second: &KernelPass) -> KernelPass {
+    let mut reads = first.reads.clone();
+    let offset = first.stages.len();
+    let mut stages = first.stages.clone();
+    for stage in &second.stages {
+        let mut stage = stage.clone();
+        for port in &mut stage.ports {
+            port.source = match port.source {
+                Source::Stage(k) => Source::Stage(k + offset),
+                Source::Read(r) => {
+                    let id = second.reads[r];
+                    Source::Read(reads.iter().position(|known| *known == id).unwrap_or_else(|| {
+                        reads.push(id);
+                        reads.len() - 1
+                    }))
+                }
+            };
+        }
+        stages.push(stage);
+    }
+    let mut writes = first.writes.clone();
+    writes.extend(second.writes.iter().cloned().map(|mut w| {
+        w.stage += offset;
+        w
+    }));
+    let mut nodes = first.nodes.clone();
+    nodes.extend(second.nodes.iter().filter(|n| !first.nodes.contains(n)));
+    KernelPass { name: String::new(), nodes, stages, reads, writes, grid: second.grid }
+}
+
+/// Takes reads away that no port loads any more.
+fn drop_unread(pass: &mut KernelPass) {
+    let used: Vec<bool> = (0..pass.reads.len())
+        .map(|r| pass.stages.iter().flat_map(|s| &s.ports).any(|p| p.source == Source::Read(r)))
+        .collect();
+    let place: Vec<usize> = used.iter().scan(0, |n, u| { let at = *n; *n += usize::from(*u); Some(at) }).collect();
+    for port in pass.stages.iter_mut().flat_map(|s| &mut s.ports) {
+        if let Source::Read(r) = &mut port.source {
+            *r = place[*r];
+        }
+    }
+    let mut keep = used.into_iter();
+    pass.reads.retain(|_| keep.next().unwrap_or(true));
+}
+
+/// Whether a device can bind everything that a pass names.
+fn within_limits(pass: &KernelPass, ops: &Ops, limits: &Limits) -> bool {
+    let count = |ids: &mut dyn Iterator<Item = ResourceId>, image: bool| {
+        ids.filter(|id| matches!(ops.shape(*id), Shape::Image(_) | Shape::Volume(_)) == image).count() as u32
+    };
+    let sampled = count(&mut pass.reads.iter().copied(), true);
+    let stored = count(&mut pass.writes.iter().map(|w| w.resource), true);
+    let mut buffers: Vec<ResourceId> = pass.drivers().collect();
+    buffers.sort_unstable();
+    buffers.dedup();
+    let buffers = buffers.len() as u32 + count(&mut pass.reads.iter().copied(), false) + count(&mut pass.writes.iter().map(|w| w.resource), false);
+    sampled <= limits.max_sampled_images && stored <= limits.max_storage_images && buffers <= limits.max_storage_buffers
+}

@@ -1,0 +1,25 @@
+//! Lists `graphs/` and the shaders that they use, so that a new preset is part of the program without being named.
+
+use std::fmt::Write as _;
+use std::path::PathBuf;
+use std::{env, fs};
+
+fn main() {
+    let folder = PathBuf::from(env::var("CARGO_MANIFEST_DIR").expect("cargo sets it")).join("../../graphs");
+    println!("cargo::rerun-if-changed={}", folder.display());
+    let mut files: Vec<PathBuf> = fs::read_dir(&folder)
+        .expect("the repository has graphs/")
+        .map(|entry| entry.expect("the folder can be listed").path())
+        .filter(|path| path.extension().is_some_and(|e| e == "ron" || e == "wgsl"))
+        .collect();
+    files.sort();
+    let mut table = String::from("[\n");
+    for file in files {
+        let path = file.canonicalize().expect("the file was just listed");
+        let name = path.file_name().expect("it is a file").to_string_lossy().into_owned();
+        writeln!(table, "    ({name:?}, include_str!({path:?})),").expect("a string takes everything");
+    }
+    table.push(']');
+    let out = PathBuf::from(env::var("OUT_DIR").expect("cargo sets it")).join("presets.rs");
+    fs::write(out, table).expect("cargo's folder can be written");
+}

@@ -1,0 +1,84 @@
+//! Between the words of `pipe-io` and those of the planner's rim.
+
+use pipe_graph::rim::{Alpha, Layout, PixelForm, Sample, Transfer};
+use pipe_io::{Channels, Colour, Form, Picture};
+
+fn sample(s: pipe_io::Sample) -> Sample {
+    match s {
+        pipe_io::Sample::U8 => Sample::U8,
+        pipe_io::Sample::U16 => Sample::U16,
+        pipe_io::Sample::F16 => Sample::F16,
+        pipe_io::Sample::F32 => Sample::F32,
+    }
+}
+
+fn layout(l: pipe_io::Layout) -> Layout {
+    match l {
+        pipe_io::Layout::Interleaved => Layout::Interleaved,
+        pipe_io::Layout::Planar => Layout::Planar,
+    }
+}
+
+fn alpha(a: pipe_io::Alpha) -> Alpha {
+    match a {
+        pipe_io::Alpha::None => Alpha::None,
+        pipe_io::Alpha::Associated => Alpha::Associated,
+        pipe_io::Alpha::Straight => Alpha::Straight,
+    }
+}
+
+fn transfer(c: &Colour) -> Transfer {
+    match c.transfer {
+        pipe_io::Transfer::Linear => Transfer::Linear,
+        pipe_io::Transfer::Srgb => Transfer::Srgb,
+        pipe_io::Transfer::Gamma(g) => Transfer::Gamma(g),
+    }
+}
+
+/// Number of channels as stored.
+pub(crate) const fn count(c: Channels) -> u8 {
+    match c {
+        Channels::Y => 1,
+        Channels::Ya => 2,
+        Channels::Rgb => 3,
+        Channels::Rgba => 4,
+    }
+}
+
+/// How a decoded picture lies in memory.
+pub(crate) fn of_picture(p: &Picture) -> PixelForm {
+    PixelForm {
+        size: [p.width, p.height],
+        channels: count(p.channels),
+        sample: sample(p.sample),
+        layout: layout(p.layout),
+        alpha: alpha(p.alpha),
+        transfer: transfer(&p.colour),
+        matrix: clean(p.colour.to_working_matrix()),
+    }
+}
+
+/// How a writer wants its pixels.
+pub(crate) fn of_form(f: &Form, size: [u32; 2]) -> PixelForm {
+    PixelForm {
+        size,
+        channels: count(f.channels),
+        sample: sample(f.sample),
+        layout: layout(f.layout),
+        alpha: alpha(f.alpha),
+        transfer: transfer(&f.colour),
+        matrix: clean(f.colour.from_working_matrix()),
+    }
+}
+
+/// A matrix within rounding of the identity is the identity, so that unchanged pixels stay so to the bit.
+fn clean(m: [[f32; 3]; 3]) -> [[f32; 3]; 3] {
+    let identity = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+    let near = m.iter().flatten().zip(identity.iter().flatten()).all(|(a, b)| (a - b).abs() < 1e-6);
+    if near { identity } else { m }
+}
+
+/// Channels of the image in the graph.
+pub(crate) const fn image_channels(c: Channels) -> u8 {
+    if matches!(c, Channels::Y) { 1 } else { 4 }
+}

@@ -1,0 +1,147 @@
+//! Sequences: every frame through the same graph, decode, GPU and encode overlapping.
+//!
+//! One thread decodes the frames ahead, this one runs them, one encodes those that are done; at most two frames wait
+//! between them, so memory is bounded. The session keeps pipelines, memory and staging over all frames.
+
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::sync_channel;
+
+use pipe_io::sequence::{FrameRange, Pattern};
+
+use crate::Failure;
+use crate::project::Project;
+use crate::run::{Finished, Inputs, Job, Report, Session, decode, input_kinds};
+
+/// Which frames, and what to do about bad ones.
+#[derive(Debug, Clone, Copy)]
+pub struct Sequence {
+    /// The frames.
+    pub frames: FrameRange,
+    /// Leave frames out whose outputs are there.
+    pub resume: bool,
+    /// Report a missing or broken frame and go on.
+    pub skip_bad: bool,
+}
+
+/// What came of a sequence.
+#[derive(Debug, Default)]
+pub struct Outcome {
+    /// Frames written.
+    pub written: u32,
+    /// Frames left out.
+    pub skipped: u32,
+    /// What the last frame had to say.
+    pub last: Option<Report>,
+}
+
+/// The job of one frame: patterns replaced by its files.
+fn at_frame(job: &Job, frame: u32) -> Result<Job, Failure> {
+    let mut job = job.clone();
+    job.frame = f64::from(frame);
+    let files = job.inputs.values_mut().chain(job.outputs.values_mut()).chain(job.dumps.values_mut());
+    for file in files {
+        if let Some(pattern) = Pattern::parse(file)? {
+            *file = pattern.name(frame);
+        }
+    }
+    Ok(job)
+}
+
+/// Runs every frame.
+pub fn run_sequence(
+    session: &mut Session,
+    job: &Job,
+    sequence: &Sequence,
+    cancel: &AtomicBool,
+    say: &(dyn Fn(&str) + Sync),
+    step: &(dyn Fn() + Sync),
+) -> Result<Outcome, Failure> {
+    let mut project = Project::open(&job.graph)?;
+    let kinds = input_kinds(&mut project);
+    let remembers = project.document.as_ref().is_some_and(|d| d.nodes.iter().any(|c| c.kind.value == "Feedback" || c.kind.value == "Accumulate"));
+    if remembers && sequence.resume {
+        return Err(Failure::Graph("a graph with Feedback cannot be resumed: each frame needs the one before\n  next: run it without --resume".into()));
+    }
+    let outputs_vary = job.outputs.values().map(|f| Pattern::parse(f)).collect::<Result<Vec<_>, _>>()?;
+    if sequence.frames.into_iter().count() > 1 && outputs_vary.iter().any(Option::is_none) {
+        return Err(Failure::Graph("every frame would be written to the same file\n  next: name outputs with `####`, such as out.####.exr".into()));
+    }
+    let frames: Vec<u32> = sequence.frames.into_iter().collect();
+    let mut outcome = Outcome::default();
+
+    std::thread::scope(|scope| {
+        let (decoded_tx, decoded_rx) = sync_channel::<(u32, Result<(Job, Option<Inputs>), Failure>)>(1);
+        let (finished_tx, finished_rx) = sync_channel::<(u32, Finished)>(1);
+        let kinds = &kinds;
+        scope.spawn(move || {
+            for frame in frames {
+                let read = || -> Result<(Job, Option<Inputs>), Failure> {
+                    let job = at_frame(job, frame)?;
+                    let done = sequence.resume && !job.outputs.is_empty() && job.outputs.values().all(|f| std::path::Path::new(f).is_file());
+                    let inputs = if done { None } else { Some(decode(&job, kinds)?) };
+                    Ok((job, inputs))
+                };
+                if cancel.load(Ordering::Relaxed) || decoded_tx.send((frame, read())).is_err() {
+                    return;
+                }
+            }
+        });
+        let encoder = scope.spawn(move || -> Result<(u32, Option<Report>), Failure> {
+            let (mut written, mut last) = (0, None);
+            while let Ok((_, finished)) = finished_rx.recv() {
+                last = Some(finished.write()?);
+                written += 1;
+                step();
+            }
+            Ok((written, last))
+        });
+        let mut result = Ok(());
+        let mut before = 0;
+        for (frame, read) in decoded_rx {
+            if cancel.load(Ordering::Relaxed) {
+                result = Err(Failure::Interrupted);
+                break;
+            }
+            let ran = read.and_then(|(mut job, inputs)| match inputs {
+                None => Ok(None),
+                Some(inputs) => {
+                    job.frames_before = before;
+                    session.execute(&job, &inputs, Some(cancel), None).map(Some)
+                }
+            });
+            match ran {
+                Ok(Some(finished)) => {
+                    before += 1;
+                    // The encoder ends early only after a failure, which is reported below.
+                    if finished_tx.send((frame, finished)).is_err() {
+                        break;
+                    }
+                }
+                Ok(None) => {
+                    outcome.skipped += 1;
+                    step();
+                }
+                Err(Failure::World(reason)) if sequence.skip_bad => {
+                    say(&format!("warning: frame {frame} is skipped: {reason}"));
+                    outcome.skipped += 1;
+                    step();
+                }
+                Err(Failure::World(reason)) => {
+                    result = Err(Failure::World(format!("frame {frame}: {reason}\n  next: --skip-bad-frames goes on without it")));
+                    break;
+                }
+                Err(other) => {
+                    result = Err(other);
+                    break;
+                }
+            }
+        }
+        drop(finished_tx);
+        let encoded = encoder.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic));
+        let (written, last) = encoded?;
+        outcome.written = written;
+        outcome.last = last;
+        result
+    })?;
+    Ok(outcome)
+}

@@ -1,0 +1,506 @@
+//! Pictures through a graph: decode, plan, execute, encode.
+//!
+//! The device is opened while inputs are decoded. Outputs are written only when everything has run, each to a
+//! temporary file that is renamed at the end; so a run that fails leaves every old file as it was.
+
+use std::collections::HashMap;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
+use std::time::{Duration, Instant};
+
+use indexmap::IndexMap;
+use pipe_gpu::{Choice, Device, Executor, Prepared, RunOptions};
+use pipe_graph::graph::{Graph, Instance, Work};
+use pipe_graph::node::{FileSource, ReadbackFile};
+use pipe_graph::pass::Limits;
+use pipe_graph::resolve::Request;
+use pipe_graph::types::{EdgeKind, EdgeType, Element, ImageType};
+use pipe_io::table::Table;
+use pipe_io::{Channels, Metadata, Picture, ReadOptions, Source, Target, WriteOptions};
+use pipe_plan::lower::{Rim, file_name, lower, readback_name};
+use pipe_plan::{Options, Plan};
+
+use crate::project::{Project, World};
+use crate::{Failure, forms, readback};
+
+/// Where an output goes.
+#[derive(Debug, Clone)]
+pub enum Destination {
+    /// An image file or stream.
+    Image(Target),
+    /// A table or a scalar: csv, json, npy, svg, png.
+    Data(PathBuf),
+}
+
+/// What to run on what.
+#[derive(Debug, Clone)]
+pub struct Job {
+    /// Path of a graph, or the bare name of a preset.
+    pub graph: String,
+    /// Files for graph inputs, `file.exr#layer`, by name.
+    pub inputs: IndexMap<String, String>,
+    /// Files for graph outputs, by name.
+    pub outputs: IndexMap<String, String>,
+    /// Files for values of private nodes, by `node` or `node.port`.
+    pub dumps: IndexMap<String, String>,
+    /// `--set`
+    pub settings: Vec<(String, String)>,
+    /// How inputs are read.
+    pub read: ReadOptions,
+    /// How outputs are written.
+    pub write: WriteOptions,
+    /// Whether passes may be fused.
+    pub fuse: bool,
+    /// Bytes that may be alive on the device.
+    pub budget: Option<u64>,
+    /// `--seed`
+    pub seed: u64,
+    /// Bounds the GPU work.
+    pub timeout: Option<Duration>,
+    /// Measure every pass.
+    pub profile: bool,
+    /// Let an output overwrite an input.
+    pub force: bool,
+    /// The frame, as `frame` in expressions.
+    pub frame: f64,
+    /// Frames that this session ran before, for `Feedback`.
+    pub frames_before: u32,
+}
+
+impl Job {
+    /// A job without files.
+    pub fn new(graph: &str) -> Self {
+        Self {
+            graph: graph.to_owned(),
+            inputs: IndexMap::new(),
+            outputs: IndexMap::new(),
+            dumps: IndexMap::new(),
+            settings: Vec::new(),
+            read: ReadOptions::default(),
+            write: WriteOptions::default(),
+            fuse: true,
+            budget: None,
+            seed: 0,
+            timeout: None,
+            profile: false,
+            force: false,
+            frame: 1.0,
+            frames_before: 0,
+        }
+    }
+
+    /// Binds a file to a graph input.
+    pub fn bind_input(&mut self, name: &str, file: &str) {
+        self.inputs.insert(name.to_owned(), file.to_owned());
+    }
+
+    /// Binds a file to a graph output. Its ending must be that of a known format.
+    pub fn bind_output(&mut self, name: &str, file: &str) -> Result<(), Failure> {
+        self.outputs.insert(name.to_owned(), file.to_owned());
+        Ok(())
+    }
+}
+
+/// Time of each stage, milliseconds.
+#[derive(Debug, Clone, Default, serde::Serialize)]
+pub struct Wall {
+    /// Reading and decoding the inputs (the device opens meanwhile).
+    pub decode: f64,
+    /// Checking and planning, compiling pipelines.
+    pub plan: f64,
+    /// Bytes to the device.
+    pub upload: f64,
+    /// Passes.
+    pub compute: f64,
+    /// Bytes from the device.
+    pub readback: f64,
+    /// Encoding and writing the outputs.
+    pub encode: f64,
+    /// All of it.
+    pub total: f64,
+}
+
+/// What a run has to say.
+#[derive(Debug, Clone, Default)]
+pub struct Report {
+    /// The device.
+    pub device: String,
+    /// Size of the first image input or output.
+    pub size: Vec<u32>,
+    /// Values of readbacks by node.
+    pub readbacks: serde_json::Map<String, serde_json::Value>,
+    /// Wall time by stage.
+    pub wall: Wall,
+    /// GPU time by pass, when it was measured.
+    pub passes: IndexMap<String, f64>,
+    /// Bytes that the plan's slots take.
+    pub peak_bytes: u64,
+    /// Warnings about the graph, rendered.
+    pub warnings: String,
+    /// The plan that ran.
+    pub plan: Option<Arc<Plan>>,
+}
+
+impl Report {
+    /// `--stats`: `{device, size, readbacks, timings, peak_bytes}`.
+    pub fn to_json(&self) -> serde_json::Value {
+        serde_json::json!({
+            "device": self.device,
+            "size": self.size,
+            "readbacks": self.readbacks,
+            "timings": self.wall,
+            "passes": self.passes,
+            "peak_bytes": self.peak_bytes,
+        })
+    }
+}
+
+/// A decoded input.
+pub enum Decoded {
+    /// An image.
+    Picture(Picture),
+    /// A table.
+    Table(Table),
+}
+
+impl Decoded {
+    fn bytes(&self) -> Vec<u8> {
+        match self {
+            Self::Picture(_) => Vec::new(),
+            Self::Table(Table::Float(v)) => v.iter().flat_map(|v| v.to_le_bytes()).collect(),
+            Self::Table(Table::Uint(v)) => v.iter().flat_map(|v| v.to_le_bytes()).collect(),
+        }
+    }
+
+    fn ty(&self) -> EdgeType {
+        match self {
+            Self::Picture(p) => EdgeType::Image(ImageType::new([p.width, p.height], forms::image_channels(p.channels))),
+            Self::Table(Table::Float(v)) => EdgeType::table(v.len() as u32, Element::F32),
+            Self::Table(Table::Uint(v)) => EdgeType::table(v.len() as u32, Element::U32),
+        }
+    }
+}
+
+/// All inputs of one frame, by graph input and by [`file_name`] of files that nodes read.
+pub type Inputs = IndexMap<String, Decoded>;
+
+/// Reads every input file of a job.
+pub fn decode(job: &Job, kinds: &HashMap<String, EdgeKind>) -> Result<Inputs, Failure> {
+    let mut inputs = Inputs::new();
+    for (name, file) in &job.inputs {
+        let value = match kinds.get(name) {
+            Some(EdgeKind::Table) => Decoded::Table(pipe_io::table::read(Path::new(file))?),
+            Some(EdgeKind::Volume) => return Err(Failure::World(format!("{file}: volume files cannot be read yet"))),
+            _ => Decoded::Picture(pipe_io::read(&Source::parse(file), &job.read)?),
+        };
+        inputs.insert(name.clone(), value);
+    }
+    Ok(inputs)
+}
+
+/// What comes out of a run before it is written.
+pub struct Finished {
+    images: Vec<(Target, Picture)>,
+    data: Vec<(ReadbackFile, Vec<u8>)>,
+    /// What there is to say.
+    pub report: Report,
+    write: WriteOptions,
+}
+
+impl Finished {
+    /// Writes every output. Nothing was written before.
+    pub fn write(mut self) -> Result<Report, Failure> {
+        let started = Instant::now();
+        for (target, picture) in &self.images {
+            let options = WriteOptions { channels: Some(picture.channels), ..self.write.clone() };
+            pipe_io::write(target, picture, &options)?;
+        }
+        for (file, bytes) in &self.data {
+            readback::write(file, bytes)?;
+        }
+        self.report.wall.encode = millis(started);
+        self.report.wall.total += self.report.wall.encode;
+        Ok(self.report)
+    }
+}
+
+/// A device, with what it keeps between frames.
+pub struct Session {
+    executor: Executor,
+    prepared: Option<Prepared>,
+}
+
+impl Session {
+    /// Opens a device; `cache` is a folder for compiled pipelines.
+    pub fn open(choice: &Choice, cache: Option<&Path>) -> Result<Self, Failure> {
+        Ok(Self { executor: Executor::new(Device::open(choice)?, cache), prepared: None })
+    }
+
+    /// The device's name.
+    pub fn device_name(&self) -> &str {
+        self.executor.device().name()
+    }
+
+    /// What plans for the device may use.
+    pub fn limits(&self) -> Limits {
+        self.executor.device().limits()
+    }
+
+    /// Measured bandwidth of copying an image of this size on the device, GB/s.
+    pub fn copy_bandwidth(&mut self, size: [u32; 2]) -> Result<f64, Failure> {
+        Ok(pipe_gpu::probe::copy_bandwidth(&mut self.executor, size)?)
+    }
+
+    /// Runs a job from files to files.
+    pub fn run(&mut self, job: &Job) -> Result<Report, Failure> {
+        let started = Instant::now();
+        let kinds = input_kinds(&mut Project::open(&job.graph)?);
+        let inputs = decode(job, &kinds)?;
+        let decoded = millis(started);
+        let mut finished = self.execute(job, &inputs, None, None)?;
+        finished.report.wall.decode = decoded;
+        finished.report.wall.total += decoded;
+        finished.write()
+    }
+
+    /// Runs a job on decoded inputs; nothing is written yet.
+    pub fn execute(
+        &mut self,
+        job: &Job,
+        inputs: &Inputs,
+        cancel: Option<&AtomicBool>,
+        progress: Option<&(dyn Fn(u32, u32) + Sync)>,
+    ) -> Result<Finished, Failure> {
+        let started = Instant::now();
+        let mut project = Project::open(&job.graph)?;
+        let world = World { read: job.read.clone() };
+        let request = request(job, inputs);
+        let Some(graph) = project.resolve(&request, &world) else { return Err(project.failure(false)) };
+        let files = read_files(&graph, job)?;
+        let (rim, outputs) = rim(job, &graph, inputs, &files)?;
+        let plan = Arc::new(make_plan(&graph, &rim, &self.limits(), job)?);
+        self.prepare(&plan)?;
+        let planned = millis(started);
+
+        let tables: HashMap<&str, Vec<u8>> = inputs.iter().map(|(n, d)| (n.as_str(), d.bytes())).collect();
+        let mut given: HashMap<&str, &[u8]> = tables.iter().map(|(n, b)| (*n, b.as_slice())).collect();
+        for (name, value) in inputs.iter().chain(&files) {
+            if let Decoded::Picture(p) = value {
+                given.insert(name, &p.bytes);
+            }
+        }
+        let options = RunOptions { timeout: job.timeout, profile: job.profile, cancel, progress };
+        let prepared = self.prepared.as_ref().expect("prepared above");
+        let mut ran = self.executor.run(prepared, &given, &options)?;
+
+        let mut report = Report {
+            device: self.device_name().to_owned(),
+            size: first_size(&graph),
+            warnings: project.render(false),
+            peak_bytes: plan.peak_bytes,
+            passes: std::mem::take(&mut ran.timings.passes),
+            ..Report::default()
+        };
+        report.wall.plan = planned;
+        report.wall.upload = ran.timings.upload_ms;
+        report.wall.compute = ran.timings.compute_ms;
+        report.wall.readback = ran.timings.readback_ms;
+        report.wall.total = millis(started);
+        report.plan = Some(plan);
+
+        let mut data = Vec::new();
+        for (name, file) in readbacks(&graph) {
+            let Some(bytes) = ran.fetched.shift_remove(&name) else { continue };
+            let shown = name.trim_end_matches(":readback").to_owned();
+            report.readbacks.insert(shown, readback::to_json(&file, &bytes));
+            if !file.path.is_empty() {
+                data.push((file, bytes));
+            }
+        }
+        let mut images = Vec::new();
+        for output in outputs {
+            let Some(bytes) = ran.fetched.shift_remove(&output.name) else { continue };
+            match output.to {
+                Packed::Image { target, form, size } => {
+                    let metadata = output.metadata.unwrap_or_default();
+                    images.push((target, form.picture(size[0], size[1], bytes, metadata)));
+                }
+                Packed::Data(file) => data.push((file, bytes)),
+            }
+        }
+        Ok(Finished { images, data, report, write: job.write.clone() })
+    }
+
+    fn prepare(&mut self, plan: &Arc<Plan>) -> Result<(), Failure> {
+        if let Some(prepared) = &mut self.prepared
+            && self.executor.update(prepared, plan)?
+        {
+            return Ok(());
+        }
+        if let Some(old) = self.prepared.take() {
+            self.executor.release(old);
+        }
+        self.prepared = Some(self.executor.prepare(plan.clone())?);
+        Ok(())
+    }
+}
+
+fn millis(since: Instant) -> f64 {
+    since.elapsed().as_secs_f64() * 1e3
+}
+
+/// The kinds of a graph's inputs, by name.
+pub fn input_kinds(project: &mut Project) -> HashMap<String, EdgeKind> {
+    let inputs = project.document.iter().flat_map(|d| &d.inputs);
+    inputs.map(|i| (i.name.value.clone(), i.kind)).collect()
+}
+
+/// What the resolver must know of a job.
+pub fn request(job: &Job, inputs: &Inputs) -> Request {
+    Request {
+        inputs: inputs.iter().map(|(name, value)| (name.clone(), value.ty())).collect(),
+        assumed: None,
+        settings: job.settings.clone(),
+        frame: job.frame,
+        time: (job.frame - 1.0) / 24.0,
+    }
+}
+
+/// Files that nodes of the graph read.
+fn read_files(graph: &Graph, job: &Job) -> Result<Inputs, Failure> {
+    let mut files = Inputs::new();
+    let mut open: Vec<&Graph> = vec![graph];
+    while let Some(graph) = open.pop() {
+        for (_, instance) in graph.iter() {
+            match &instance.work {
+                Work::Node(node) => {
+                    let Some(source) = node.file() else { continue };
+                    let name = file_name(&source);
+                    let FileSource::Image(path) = &source else {
+                        return Err(Failure::World("volume files cannot be read yet".into()));
+                    };
+                    if !files.contains_key(&name) {
+                        files.insert(name, Decoded::Picture(pipe_io::read(&Source::parse(path), &job.read)?));
+                    }
+                }
+                Work::Iterate(iteration) => open.push(&iteration.body),
+                _ => {}
+            }
+        }
+    }
+    Ok(files)
+}
+
+/// A fetched output on its way to a file.
+struct Output {
+    name: String,
+    to: Packed,
+    metadata: Option<Metadata>,
+}
+
+enum Packed {
+    Image { target: Target, form: pipe_io::Form, size: [u32; 2] },
+    Data(ReadbackFile),
+}
+
+/// In which form everything crosses the rim.
+fn rim(job: &Job, graph: &Graph, inputs: &Inputs, files: &Inputs) -> Result<(Rim, Vec<Output>), Failure> {
+    let mut rim = Rim { frames_before: job.frames_before, seed: job.seed, ..Rim::default() };
+    for (name, value) in inputs.iter().chain(files) {
+        if let Decoded::Picture(p) = value {
+            rim.inputs.insert(name.clone(), forms::of_picture(p));
+        }
+    }
+    let first = inputs.values().chain(files.values()).find_map(|d| match d {
+        Decoded::Picture(p) => Some(&p.metadata),
+        Decoded::Table(_) => None,
+    });
+    let mut outputs = Vec::new();
+    let named = graph.outputs().map(|(n, v)| (n.to_owned(), v));
+    let asked: Vec<_> = named.filter_map(|(n, v)| Some((job.outputs.get(&n)?.clone(), n, v))).collect();
+    let mut all: Vec<(String, String, _)> = asked;
+    for (node, file) in &job.dumps {
+        let value = graph.find(node).ok_or_else(|| {
+            let names: Vec<&str> = graph.iter().map(|(_, i)| i.name.as_str()).collect();
+            let hint = pipe_graph::diagnostic::nearest(node, names).map(|n| format!("; did you mean `{n}`?")).unwrap_or_default();
+            Failure::Graph(format!("--dump {node}: there is no such node or port{hint}"))
+        })?;
+        let name = format!("dump:{node}");
+        rim.dumps.insert(name.clone(), value);
+        all.push((file.clone(), name, value));
+    }
+    for (file, name, value) in all {
+        let ty = graph.ty(value);
+        let to = match ty {
+            EdgeType::Image(t) => {
+                let target = Target::parse(&file)?;
+                let alpha = first.is_some_and(|m| m.had_alpha) || sets_alpha(graph);
+                let channels = match (t.channels, alpha) {
+                    (1, _) => Channels::Y,
+                    (4, true) => Channels::Rgba,
+                    _ => Channels::Rgb,
+                };
+                let options = WriteOptions { channels: Some(channels), ..job.write.clone() };
+                let form = pipe_io::output_form(&target, &options, first)?;
+                rim.outputs.insert(name.clone(), forms::of_form(&form, t.size));
+                Packed::Image { target, form, size: t.size }
+            }
+            EdgeType::Table(_) | EdgeType::Scalar(_) => {
+                Packed::Data(ReadbackFile { path: file, element: None, channels: Vec::new(), ty })
+            }
+            EdgeType::Volume(_) | EdgeType::Mesh(_) => {
+                return Err(Failure::Graph(format!("output `{name}` is {ty}, which cannot be written yet")));
+            }
+        };
+        outputs.push(Output { name, to, metadata: first.cloned() });
+    }
+    Ok((rim, outputs))
+}
+
+/// Whether some node of the graph may make alpha other than 1 where the inputs had none.
+fn sets_alpha(graph: &Graph) -> bool {
+    let sets = |instance: &Instance| match &instance.work {
+        Work::Node(_) => pipe_nodes::REGISTRY.get(instance.kind).is_some_and(|k| k.sets_alpha),
+        Work::Iterate(iteration) => sets_alpha(&iteration.body),
+        _ => false,
+    };
+    graph.iter().any(|(_, i)| sets(i))
+}
+
+/// Readback nodes and options of a graph, by the name that they are fetched by.
+fn readbacks(graph: &Graph) -> Vec<(String, ReadbackFile)> {
+    let mut found = Vec::new();
+    for (_, instance) in graph.iter() {
+        let types: Vec<EdgeType> = instance.inputs.iter().map(|v| graph.ty(*v)).collect();
+        if let Work::Node(node) = &instance.work
+            && let Some(file) = node.readback(&types)
+        {
+            found.push((instance.name.clone(), file));
+        }
+        if let (Some(path), Some(output)) = (&instance.options.readback, instance.outputs.first()) {
+            let file = ReadbackFile { path: path.clone(), element: None, channels: Vec::new(), ty: output.ty };
+            found.push((readback_name(instance), file));
+        }
+    }
+    found
+}
+
+fn first_size(graph: &Graph) -> Vec<u32> {
+    let outputs = graph.outputs().map(|(_, v)| graph.ty(v));
+    let all = graph.inputs().map(|(_, t)| t).chain(outputs);
+    let size = |t: EdgeType| match t {
+        EdgeType::Image(t) => Some(t.size.to_vec()),
+        EdgeType::Volume(t) => Some(t.size.to_vec()),
+        _ => None,
+    };
+    all.filter_map(size).next().unwrap_or_default()
+}
+
+/// Lowers and plans.
+pub fn make_plan(graph: &Graph, rim: &Rim, limits: &Limits, job: &Job) -> Result<Plan, Failure> {
+    let mut passes = lower(graph, rim, limits)?;
+    // An output that no file is bound to is not computed.
+    passes.fetches.retain(|f| rim.outputs.contains_key(&f.name) || !graph.outputs().any(|(n, _)| n == f.name) || job.outputs.contains_key(&f.name));
+    Ok(pipe_plan::plan(&graph.name, passes, limits, &Options { fuse: job.fuse, budget: job.budget })?)
+}
