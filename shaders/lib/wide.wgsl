@@ -88,13 +88,16 @@ fn viewed(c: vec4f, view: i32) -> vec4f {
 }
 
 /// The bin of v among `bins` equal bins over lo..hi: floor((v − lo)/(hi − lo)·bins) of the true quotient, with hi
-/// in the last bin; −1 below lo, `bins` above hi. v is a pair and no NaN.
+/// in the last bin; −1 below lo, `bins` above hi. v is a pair and no NaN. All bins are the first when hi = lo.
 fn bin_index(v: vec2f, lo: f32, hi: f32, bins: i32) -> i32 {
     if wide_less(v, vec2f(lo, 0.0)) {
         return -1;
     }
     if wide_less(vec2f(hi, 0.0), v) {
         return bins;
+    }
+    if hi <= lo {
+        return 0;
     }
     let n = f32(bins);
     let t = ((v.x - lo) + v.y) / (hi - lo) * n;
@@ -112,6 +115,13 @@ fn bin_index(v: vec2f, lo: f32, hi: f32, bins: i32) -> i32 {
         }
     }
     return k;
+}
+
+/// How far into its bin v lies, 0..1, to the last digit even where bins are narrow and values large.
+fn bin_fraction(v: vec2f, lo: f32, hi: f32, bins: i32, bin: i32) -> f32 {
+    let left = wide_scale(wide_add(v, vec2f(-lo, 0.0)), f32(bins));
+    let edge = wide_scale(two_sum(hi, -lo), f32(bin));
+    return clamp(wide_add(left, -edge).x / (hi - lo), 0.0, 1.0);
 }
 
 /// The bin that a pixel falls in, or −1. Channel 0 is the luminance, 1 to 4 are R, G, B, A. NaN falls in none; what

@@ -4,9 +4,13 @@ use pipe_graph::node::Kind;
 
 mod bins;
 mod box_from_sat;
+mod clahe;
+mod compare;
 mod equalize;
+mod flip;
 mod histogram;
 mod histogram2d;
+mod histogram_match;
 mod normalize;
 mod prefix;
 mod pyramid_average;
@@ -16,8 +20,10 @@ mod sat;
 mod sat_average;
 mod scan;
 mod scope;
+mod ssim;
 mod stats;
 mod summed_area;
+mod threshold;
 mod vectorscope;
 mod waveform;
 
@@ -32,7 +38,11 @@ pub(crate) const KINDS: &[Kind] = &[
     vectorscope::KIND,
     scan::KIND,
     equalize::KIND,
+    histogram_match::KIND,
+    clahe::KIND,
     sat::KIND,
     box_from_sat::KIND,
+    compare::KIND,
     normalize::KIND,
+    threshold::KIND,
 ];

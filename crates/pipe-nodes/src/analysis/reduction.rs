@@ -70,6 +70,12 @@ pub(crate) fn deviation(cx: &mut Lowering<'_>, suffix: &str, image: ResourceId, 
     sums.lower(cx, suffix, image, view)
 }
 
+/// The mean of the squares of every channel.
+pub(crate) fn mean_square(cx: &mut Lowering<'_>, suffix: &str, image: ResourceId) -> ResourceId {
+    let sums = Sums { measure: 2, finish: 0, epsilon: 0.0, centre: None };
+    sums.lower(cx, suffix, image, View::Channels)
+}
+
 /// How many values of each channel are finite, as a float.
 pub(crate) fn finite(cx: &mut Lowering<'_>, suffix: &str, image: ResourceId) -> ResourceId {
     let sums = Sums { measure: 0, finish: 3, epsilon: 0.0, centre: None };
