@@ -1,10 +1,15 @@
 // The fraction of a shift does not depend on where the pixel lies, so far pixels are as exact as near ones.
 
+import package::lib::number::is_nan;
 import package::lib::texel::texel;
 import package::lib::wide::{two_product, wide_add};
 
 fn at(xy: vec2i) -> vec4f {
     let map = load_map(xy);
+    let sum = map.r + map.g;
+    if is_nan(sum) {
+        return vec4f(sum);
+    }
     let dx = two_product(params.scale.x, map.r);
     let dy = two_product(params.scale.y, map.g);
     if !LINEAR {

@@ -1,7 +1,7 @@
 fn at(xy: vec2i) -> vec4f {
-    let from = xy - params.origin;
-    if COLORED && (any(from < vec2i(0)) || any(from >= size_image())) {
+    let place = xy - params.origin;
+    if COLORED && (any(place < vec2i(0)) || any(place >= size_image())) {
         return params.color;
     }
-    return load_image(from);
+    return load_image(place);
 }

@@ -11,15 +11,14 @@ fn at(xy: vec2i) -> vec4f {
     var total = vec4f(0.0);
     var lost = vec4f(0.0);
     // Blocks of 64 terms, joined with what rounding loses: long sums stay as good as short ones.
-    for (var from = 0; from < params.width; from += 64) {
+    for (var begin = 0; begin < params.width; begin += 64) {
         var part = vec4f(0.0);
-        for (var k = from; k < min(from + 64, params.width); k++) {
+        for (var k = begin; k < min(begin + 64, params.width); k++) {
             let place = select(vec2i(first + k, xy.y), vec2i(xy.x, first + k), AXIS == 1);
             part += load_weights(row + k) * load_image(place);
         }
-        let sum = total + part;
-        lost += sum_error(total, part, sum);
-        total = sum;
+        lost += sum_error(total, part);
+        total += part;
     }
     // Where a sum is infinite, what it lost is no number.
     let whole = vec4<bool>(is_finite(total.r), is_finite(total.g), is_finite(total.b), is_finite(total.a));

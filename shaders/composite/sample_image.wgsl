@@ -1,8 +1,13 @@
+import package::lib::number::is_nan;
 import package::lib::texel::texel;
 import package::lib::wide::{two_product, wide_add};
 
 fn at(xy: vec2i) -> vec4f {
     let coords = load_coords(xy);
+    let sum = coords.r + coords.g;
+    if is_nan(sum) {
+        return vec4f(sum);
+    }
     let size = select(vec2f(1.0), vec2f(size_image()), NORMALIZED);
     let u = two_product(coords.r, size.x);
     let v = two_product(coords.g, size.y);

@@ -1,3 +1,4 @@
+import package::lib::number::is_nan;
 import package::lib::texel::texel;
 import package::lib::wide::{two_product, wide_add};
 
@@ -9,6 +10,10 @@ fn slice(p: vec3i, x: f32, y: f32) -> vec4f {
 
 fn at(xy: vec2i) -> vec4f {
     let coords = load_coords(xy);
+    let sum = coords.r + coords.g + coords.b;
+    if is_nan(sum) {
+        return vec4f(sum);
+    }
     let size = select(vec3f(1.0), vec3f(size_image()), NORMALIZED);
     let u = two_product(coords.r, size.x);
     let v = two_product(coords.g, size.y);

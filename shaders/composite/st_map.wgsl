@@ -1,8 +1,13 @@
+import package::lib::number::is_nan;
 import package::lib::texel::texel;
 import package::lib::wide::{two_product, wide_add, wide_scale};
 
 fn at(xy: vec2i) -> vec4f {
     let map = load_map(xy);
+    let sum = map.r + map.g;
+    if is_nan(sum) {
+        return vec4f(sum);
+    }
     let size = vec2f(size_image());
     let u = wide_scale(two_product(params.scale.x, map.r), size.x);
     let v = wide_scale(two_product(params.scale.y, map.g), size.y);

@@ -9,6 +9,6 @@ fn at(xy: vec2i) -> vec4f {
     let above = living(xy + vec2i(-1, -1)) + living(xy + vec2i(0, -1)) + living(xy + vec2i(1, -1));
     let below = living(xy + vec2i(-1, 1)) + living(xy + vec2i(0, 1)) + living(xy + vec2i(1, 1));
     let n = above + below + living(xy - vec2i(1, 0)) + living(xy + vec2i(1, 0));
-    let set = select(vec3u(params.birth), vec3u(params.survival), here.rgb > vec3f(0.5));
-    return vec4f(vec3f((set >> n) & vec3u(1u)), here.a);
+    let rule = select(vec3u(params.birth), vec3u(params.survival), here.rgb > vec3f(0.5));
+    return vec4f(vec3f((rule >> n) & vec3u(1u)), here.a);
 }
