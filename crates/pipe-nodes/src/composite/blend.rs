@@ -6,7 +6,7 @@ use smart_default::SmartDefault;
 use super::arithmetic::{maximum, minimum};
 use crate::shader;
 
-/// Blends as the output stage of a graphics card does: equation(src·src_factor, dst·dst_factor), channel by channel,
+/// Blends as the output stage of a graphics card does: `equation(src·src_factor, dst·dst_factor)`, channel by channel,
 /// alpha with the alpha of its factors. Nothing is clamped. The defaults lay `src` over `dst` (associated alpha).
 ///
 /// After the OpenGL 4.6 specification, 17.3.6 (tables 17.1 and 17.2).

@@ -106,7 +106,9 @@ impl Axis {
         let end = ((centre + support + 0.5).floor() as i64).max(first + 1);
         let mut weights: Vec<f64> = (first..end).map(|x| kernel.weight((x as f64 + 0.5 - centre) / stretch)).collect();
         let sum: f64 = weights.iter().sum();
-        weights.iter_mut().for_each(|w| *w /= sum);
+        for w in &mut weights {
+            *w /= sum;
+        }
         (first, weights)
     }
 

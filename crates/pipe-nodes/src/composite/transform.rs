@@ -201,4 +201,25 @@ mod tests {
         // The resized image lies at (2, 0) pixel for pixel.
         assert_eq!(shrink.backward([8, 8], axes), [[1.0, 0.0, -2.0], [0.0, 1.0, 0.0]]);
     }
+
+    /// Pillow 12 on the image below, its edges repeated 20 times to every side: `rotate(-30, BILINEAR)`, and
+    /// `transform(AFFINE, …, BILINEAR)` of the inverse map.
+    #[test]
+    fn agrees_with_pillow() {
+        let image = Raster::from_fn([9, 9], 1, |x, y| [((3 * x * x + 5 * y * x + 7 * y) % 13) as f64 / 13.0, 0.0, 0.0, 1.0]);
+        let input = Tensor::Image(image);
+        let turn = Transform { rotate: 30.0, ..Transform::default() };
+        let grow = Transform { scale: Pair::Both(1.5), translate: [2.25, -0.5], ..Transform::default() };
+        for (node, expected) in [
+            (turn, [0.365484, 0.0, 0.596253, 0.553722, 0.723423]),
+            (grow, [0.230769, 0.5, 0.773504, 0.508547, 0.444444]),
+        ] {
+            let node = Transform { image: In::new(pipe_graph::field::EdgeIndex(0)), filter: Filtering::Linear, ..node };
+            let cx = Reference { inputs: &[&input], file: None, border: Border::Clamp, filter: Filter::Linear, seed: 0 };
+            let Tensor::Image(got) = &node.reference(&cx)[0] else { panic!("the result is an image") };
+            for ((x, y), expected) in [(0, 0), (4, 4), (2, 6), (8, 3), (5, 1)].into_iter().zip(expected) {
+                assert!((got.at(x, y)[0] - expected).abs() < 2e-6, "({x}, {y}) is {}, expected {expected}", got.at(x, y)[0]);
+            }
+        }
+    }
 }

@@ -37,7 +37,7 @@ impl Solver {
 }
 
 /// Smallest k with rateᵏ·(1 + k + rate·k) ≤ tolerance: what is left of an error after k iterations that begin with
-/// x = x⁻, from e_k = rateᵏ·(U_k(t) − rate·U_{k−1}(t))·e₀ with Chebyshev's |U_k| ≤ k + 1.
+/// x = x⁻, from `e_k = rateᵏ·(U_k(t) − rate·U_{k−1}(t))·e_0` with Chebyshev's `|U_k| ≤ k + 1`.
 fn iterations(rate: f64, tolerance: f64) -> u32 {
     let left = |k: u32| f64::from(k) * rate.ln() + (1.0 + f64::from(k) * (1.0 + rate)).ln();
     if rate <= 0.0 {

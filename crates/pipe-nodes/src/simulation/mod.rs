@@ -11,6 +11,7 @@ mod state;
 mod wave;
 mod wave_equation;
 mod wave_step;
+mod wave_twin;
 
 use pipe_graph::node::Kind;
 

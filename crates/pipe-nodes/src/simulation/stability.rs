@@ -29,7 +29,7 @@ fn amplification(integrator: Integrator, h: f64, omega2: f64, damping: f64) -> [
 }
 
 fn spectral_radius([[a, b], [c, d]]: [[f64; 2]; 2]) -> f64 {
-    let (half, det) = ((a + d) / 2.0, a * d - b * c);
+    let (half, det) = (f64::midpoint(a, d), a * d - b * c);
     let disc = half * half - det;
     if disc >= 0.0 { half.abs() + disc.sqrt() } else { det.sqrt() }
 }

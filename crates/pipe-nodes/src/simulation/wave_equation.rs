@@ -8,7 +8,8 @@ use super::energy;
 use super::implicit::Solver;
 use super::stability::exceeded_limit;
 use super::state::begin;
-use super::wave::{Boundary, Grid64, Medium};
+use super::wave::{Boundary, Medium};
+use super::wave_twin::{Grid64, step};
 use crate::shader;
 
 /// Solves ∂u/∂t = v, ∂v/∂t = c²∇²u − damping·v for `steps` steps of `dt`, with the 5-point ∇² on a grid of
@@ -245,83 +246,4 @@ impl Node for WaveEquation {
         let pixels = u.into_iter().zip(v).map(|(u, v)| [u, v, 0.0, 1.0]).collect();
         vec![Tensor::Image(Raster { size: image.size, channels: 2, pixels }), Tensor::Scalar(vec![energy])]
     }
-}
-
-/// a + k·b
-fn plus(a: &[f64], k: f64, b: &[f64]) -> Vec<f64> {
-    a.iter().zip(b).map(|(a, b)| a + k * b).collect()
-}
-
-/// One step of the twin, each method as its textbook writes it.
-fn step(grid: &Grid64, integrator: Integrator, u: &[f64], v: &[f64]) -> (Vec<f64>, Vec<f64>) {
-    let h = f64::from(grid.medium.dt);
-    let gamma = grid.damping();
-    let slope = |u: &[f64], v: &[f64]| -> Vec<f64> {
-        grid.curvature(u).iter().zip(v).zip(&gamma).map(|((l, v), g)| l - g * v).collect()
-    };
-    let a = slope(u, v);
-    match integrator {
-        Integrator::Euler => (plus(u, h, v), plus(v, h, &a)),
-        Integrator::SymplecticEuler => {
-            let v = plus(v, h, &a);
-            (plus(u, h, &v), v)
-        }
-        Integrator::Midpoint => {
-            let (um, vm) = (plus(u, h / 2.0, v), plus(v, h / 2.0, &a));
-            (plus(u, h, &vm), plus(v, h, &slope(&um, &vm)))
-        }
-        Integrator::RungeKutta2 => {
-            let (u1, v1) = (plus(u, h, v), plus(v, h, &a));
-            let b = slope(&u1, &v1);
-            (plus(u, h / 2.0, &plus(v, 1.0, &v1)), plus(v, h / 2.0, &plus(&a, 1.0, &b)))
-        }
-        Integrator::Verlet => {
-            let u = plus(&plus(u, h, v), h * h / 2.0, &a);
-            // a⁺ = c²∇²u⁺ − γv⁺ holds the v⁺ that is wanted.
-            let pulled = plus(&plus(v, h / 2.0, &a), h / 2.0, &grid.curvature(&u));
-            let v = pulled.iter().zip(&gamma).map(|(p, g)| p / (1.0 + h / 2.0 * g)).collect();
-            (u, v)
-        }
-        Integrator::BackwardEuler => {
-            // v⁺ = v + h·(c²∇²(u + h·v⁺) − γv⁺)
-            let rhs = plus(v, h, &grid.curvature(u));
-            let next = solve(&rhs, v, |x| plus(&damped(x, h, &gamma), -h * h, &grid.curvature(x)));
-            (plus(u, h, &next), next)
-        }
-        Integrator::CrankNicolson => {
-            // v⁺ = v + h/2·(a + c²∇²(u + h/2·(v + v⁺)) − γv⁺)
-            let k = h / 2.0;
-            let rhs = plus(&plus(v, k, &a), k, &grid.curvature(&plus(u, k, v)));
-            let next = solve(&rhs, v, |x| plus(&damped(x, k, &gamma), -k * k, &grid.curvature(x)));
-            (plus(u, k, &plus(v, 1.0, &next)), next)
-        }
-    }
-}
-
-/// (1 + k·γ)·x
-fn damped(x: &[f64], k: f64, gamma: &[f64]) -> Vec<f64> {
-    x.iter().zip(gamma).map(|(x, g)| x * (1.0 + k * g)).collect()
-}
-
-/// Conjugate gradients for a symmetric positive definite product, to the last digits.
-fn solve(rhs: &[f64], guess: &[f64], product: impl Fn(&[f64]) -> Vec<f64>) -> Vec<f64> {
-    let dot = |a: &[f64], b: &[f64]| -> f64 { a.iter().zip(b).map(|(a, b)| a * b).sum() };
-    let mut x = guess.to_vec();
-    let mut r = plus(rhs, -1.0, &product(&x));
-    let mut p = r.clone();
-    let mut rr = dot(&r, &r);
-    let small = 1e-28 * dot(rhs, rhs);
-    for _ in 0..10_000 {
-        if rr <= small {
-            break;
-        }
-        let ap = product(&p);
-        let alpha = rr / dot(&p, &ap);
-        x = plus(&x, alpha, &p);
-        r = plus(&r, -alpha, &ap);
-        let next = dot(&r, &r);
-        p = plus(&r, next / rr, &p);
-        rr = next;
-    }
-    x
 }

@@ -3,7 +3,8 @@
 use pipe_graph::prelude::*;
 use smart_default::SmartDefault;
 
-use super::wave::{Boundary, Grid64, Medium};
+use super::wave::{Boundary, Medium};
+use super::wave_twin::Grid64;
 use crate::shader;
 
 /// One pass of an explicit integrator of ∂u/∂t = v, ∂v/∂t = c²∇²u − damping·v. `Euler` is a whole step;
