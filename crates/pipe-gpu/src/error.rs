@@ -33,20 +33,42 @@ pub enum GpuError {
         message: String,
     },
     /// Memory ran out.
-    #[error("out of device memory while making {what} of {bytes} bytes\n  next: close other programs, shrink the image, or set a budget with --vram")]
+    #[error("out of device memory at `{what}`{}\n  next: close other programs, shrink the image, or set a budget with --vram", of_size(*bytes))]
     OutOfMemory {
         /// What did not fit.
         what: String,
-        /// Its size.
+        /// Its size in bytes, 0 when unknown.
         bytes: u64,
     },
+    /// Something is larger than the device can hold in one piece.
+    #[error("`{what}` needs {size}, this device allows {limit}\n  next: shrink the image, or choose another device (`pipe devices` lists their limits)")]
+    TooLarge {
+        /// The graph and the slot.
+        what: String,
+        /// What it needs.
+        size: String,
+        /// What there is.
+        limit: String,
+    },
+    /// The plan does not fit the budget.
+    #[error("`{what}` needs {} of device memory, the budget is {}; the largest parts are {largest}\n  next: give it more with --vram, shrink the image, or use options: (format: F16)", size(*needed), size(*budget))]
+    OverBudget {
+        /// The graph.
+        what: String,
+        /// Bytes of all slots, kept frames and staging buffers.
+        needed: u64,
+        /// Bytes that are allowed.
+        budget: u64,
+        /// The largest slots, in words.
+        largest: String,
+    },
     /// The work took longer than `--timeout`.
-    #[error("`{node}` did not finish within {seconds} s\n  next: give it more with --timeout SECONDS, or look for an endless loop in its shader")]
+    #[error("`{node}` did not finish within {limit:?}\n  next: give it more with --timeout SECONDS, or look for an endless loop in its shader")]
     Timeout {
-        /// The pass that was running, or the first of the batch.
+        /// The passes that were running: those of one submission.
         node: String,
         /// The bound.
-        seconds: u64,
+        limit: std::time::Duration,
     },
     /// The device went away.
     #[error("the device was lost while running `{node}`: {reason}\n  next: run `pipe doctor`; if it happens again, lower the work per pass or try --device cpu")]
@@ -82,9 +104,36 @@ pub enum GpuError {
         /// What the plan reads.
         wanted: u64,
     },
+    /// The plan does not fit itself, which its maker must not let happen.
+    #[error("the plan of `{node}` is inconsistent: {reason}\n  next: this is a mistake in pipe; please report it with the graph")]
+    Plan {
+        /// The pass or the graph.
+        node: String,
+        /// What does not fit.
+        reason: String,
+    },
     /// The user interrupted the run.
     #[error("interrupted")]
     Interrupted,
+}
+
+fn of_size(bytes: u64) -> String {
+    if bytes == 0 { String::new() } else { format!(", {} in one piece", size(bytes)) }
+}
+
+/// Bytes in the largest unit that leaves at least one of it.
+pub(crate) fn size(bytes: u64) -> String {
+    let units = ["KiB", "MiB", "GiB", "TiB"];
+    let mut value = bytes as f64;
+    let mut unit = "bytes";
+    for larger in units {
+        if value < 1024.0 {
+            break;
+        }
+        value /= 1024.0;
+        unit = larger;
+    }
+    if unit == "bytes" { format!("{bytes} bytes") } else { format!("{value:.1} {unit}") }
 }
 
 /// What to install where there is no adapter.

@@ -1,36 +1,39 @@
 //! Plan → outputs.
 //!
 //! Everything that a plan needs is made once ([`Executor::prepare`]): pipelines, memory, bind groups. A run then only
-//! records launches. Long loops are cut into submissions of some tens of milliseconds, measured as they go, with two
-//! in flight: so no watchdog fires, the host never falls behind, and memory does not grow with the number of
-//! iterations.
+//! uploads, records launches, and brings back. What outlives a plan (pipelines, memory that the next plan can use,
+//! staging buffers, values of earlier frames) belongs to the executor.
 
-use std::collections::{HashMap, VecDeque};
+use std::collections::HashMap;
+use std::ops::Range;
 use std::path::Path;
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::AtomicBool;
+use std::sync::{Arc, PoisonError};
 use std::time::{Duration, Instant};
 
 use indexmap::IndexMap;
-use pipe_plan::plan::{Binding, Plan, Repeat, Run, SlotId, Step, Times};
+use pipe_plan::plan::Plan;
 
 use crate::device::Device;
 use crate::error::GpuError;
-use crate::pipelines::{Pipeline, Pipelines};
+use crate::history::Histories;
+use crate::patience::Patience;
+use crate::pipelines::Pipelines;
+use crate::prepare::{Prepared, kernel_names};
 use crate::record::Recorder;
-use crate::storage::{Memory, Pool, allocate};
-use crate::transfer::{Transfer, copy_out, wait};
+use crate::storage::{self, Memory, Pool};
+use crate::transfer::{Transfer, copy_out};
 
 /// How to run.
 #[derive(Clone, Copy, Default)]
 pub struct RunOptions<'a> {
-    /// Bounds the GPU work of one run.
+    /// Bounds the whole run: transfers and GPU work.
     pub timeout: Option<Duration>,
     /// Measure the GPU time of every pass. Passes then run one by one.
     pub profile: bool,
-    /// Set from outside to end the run early.
+    /// Set from outside to end the run early; it is looked at several times a second.
     pub cancel: Option<&'a AtomicBool>,
-    /// Told now and then: iterations done and to do of the loop that is running.
+    /// Told now and then: iterations recorded and to do of the outermost loop that is running.
     pub progress: Option<&'a (dyn Fn(u32, u32) + Sync)>,
 }
 
@@ -43,7 +46,7 @@ pub struct Timings {
     pub compute_ms: f64,
     /// Milliseconds of bytes on their way out.
     pub readback_ms: f64,
-    /// GPU milliseconds by pass name, in the order of first launch; empty unless profiled.
+    /// GPU milliseconds by pass name, summed over iterations, in the order of first launch; empty unless profiled.
     pub passes: IndexMap<String, f64>,
 }
 
@@ -56,52 +59,33 @@ pub struct Outputs {
     pub timings: Timings,
 }
 
+/// Bytes of a fetch on their way to the caller, in mapped memory.
+#[derive(Debug)]
+pub struct Part<'a> {
+    /// Name of the fetch.
+    pub name: &'a str,
+    /// Where they lie in the whole.
+    pub range: Range<u64>,
+    /// The bytes, `range.end - range.start` of them.
+    pub bytes: &'a [u8],
+}
+
 /// Runs plans on one device.
 pub struct Executor {
     device: Device,
     pipelines: Pipelines,
     pool: Pool,
     transfer: Transfer,
-    /// Earlier values of histories, the newest last.
-    histories: HashMap<String, VecDeque<Memory>>,
-}
-
-/// A plan with everything that it needs on the device.
-pub struct Prepared {
-    plan: Arc<Plan>,
-    memory: Vec<Memory>,
-    uniforms: Option<wgpu::Buffer>,
-    steps: Vec<Ready>,
-    pipelines: Vec<Arc<Pipeline>>,
-}
-
-/// A step that can be recorded.
-pub(crate) enum Ready {
-    Run(ReadyRun),
-    Repeat(ReadyRepeat),
-}
-
-pub(crate) struct ReadyRun {
-    pub(crate) name: String,
-    pub(crate) pipeline: Arc<Pipeline>,
-    pub(crate) group: wgpu::BindGroup,
-    pub(crate) groups: [u32; 3],
-    pub(crate) clears: Vec<wgpu::Buffer>,
-    pub(crate) target: Option<wgpu::TextureView>,
-}
-
-pub(crate) struct ReadyRepeat {
-    first: Vec<Ready>,
-    odd: Vec<Ready>,
-    even: Vec<Ready>,
-    repeat: Repeat,
+    histories: Histories,
+    budget: Option<u64>,
 }
 
 impl Executor {
-    /// An executor; `cache` is a folder for compiled pipelines.
+    /// An executor; `cache` is a folder for compiled pipelines, made when there is none.
     pub fn new(device: Device, cache: Option<&Path>) -> Self {
         let pipelines = cache.map(|folder| Pipelines::with_cache(&device, folder)).unwrap_or_default();
-        Self { device, pipelines, pool: Pool::default(), transfer: Transfer::default(), histories: HashMap::new() }
+        let (pool, transfer, histories) = (Pool::default(), Transfer::new(), Histories::default());
+        Self { device, pipelines, pool, transfer, histories, budget: None }
     }
 
     /// The device.
@@ -109,41 +93,42 @@ impl Executor {
         &self.device
     }
 
-    /// Makes everything that a plan needs.
+    /// Bounds the bytes that a plan may take on the device; the budget that a plan itself names holds too.
+    pub fn set_budget(&mut self, bytes: Option<u64>) {
+        self.budget = bytes;
+    }
+
+    /// Makes everything that a plan needs. Nothing is allocated for a plan that cannot fit.
     pub fn prepare(&mut self, plan: Arc<Plan>) -> Result<Prepared, GpuError> {
-        let mut nodes = vec![plan.name.clone(); plan.kernels.len()];
-        name_kernels(&plan.steps, &mut nodes);
-        let pipelines = self.pipelines.compile(&self.device, &plan.kernels, &nodes)?;
+        storage::check(&self.device, &plan, self.budget)?;
+        if let Some(budget) = self.budget.into_iter().chain(plan.limits.budget).min() {
+            self.transfer.fit(budget - storage::bytes_needed(&plan));
+        }
+        let pipelines = self.pipelines.compile(&self.device, &plan.kernels, &kernel_names(&plan))?;
         let memory = self.pool.take(&self.device, &plan)?;
         let uniforms = (!plan.uniforms.is_empty()).then(|| {
+            let bytes = pad(&plan.uniforms);
             let buffer = self.device.device.create_buffer(&wgpu::BufferDescriptor {
                 label: Some("uniforms"),
-                size: (plan.uniforms.len() as u64).next_multiple_of(256),
+                size: bytes.len() as u64,
                 usage: wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST,
                 mapped_at_creation: false,
             });
-            self.device.queue.write_buffer(&buffer, 0, &pad(&plan.uniforms));
+            self.device.queue.write_buffer(&buffer, 0, &bytes);
             buffer
         });
-        let maker = Maker { device: &self.device, plan: &plan, memory: &memory, uniforms: uniforms.as_ref(), pipelines: &pipelines };
-        let steps = plan.steps.iter().map(|s| maker.ready(s)).collect();
-        self.device.check(&plan.name)?;
-        let mut prepared = Prepared { plan, memory, uniforms, steps, pipelines };
-        self.write_literals(&mut prepared)?;
+        let prepared = Prepared::new(&self.device, plan, memory, uniforms, &pipelines)?;
+        self.write_literals(&prepared)?;
         Ok(prepared)
     }
 
-    fn write_literals(&mut self, prepared: &mut Prepared) -> Result<(), GpuError> {
-        for (slot, bytes) in &prepared.plan.literals {
-            let all = [0..bytes.len() as u64];
-            self.transfer.upload(&self.device, buffer(&prepared.memory, *slot), bytes, &all, None)?;
-        }
-        Ok(())
-    }
-
-    /// Takes over a plan that differs from the prepared one in parameters only; `false` when it differs in more.
+    /// Takes over a plan that differs from the prepared one in uniforms and literals only, making nothing anew;
+    /// `false`, and nothing done, when it differs in more.
     pub fn update(&mut self, prepared: &mut Prepared, plan: &Arc<Plan>) -> Result<bool, GpuError> {
         let old = &prepared.plan;
+        if Arc::ptr_eq(old, plan) {
+            return Ok(true);
+        }
         let same = old.slots == plan.slots
             && old.kernels == plan.kernels
             && old.steps == plan.steps
@@ -151,7 +136,7 @@ impl Executor {
             && old.histories == plan.histories
             && old.uploads == plan.uploads
             && old.uniforms.len() == plan.uniforms.len()
-            && old.literals.iter().map(|l| l.0).eq(plan.literals.iter().map(|l| l.0));
+            && old.literals.iter().map(|(slot, bytes)| (slot, bytes.len())).eq(plan.literals.iter().map(|(slot, bytes)| (slot, bytes.len())));
         if !same {
             return Ok(false);
         }
@@ -174,29 +159,39 @@ impl Executor {
         self.pool.give(&plan, memory);
     }
 
-    /// Uploads, runs, and brings back.
-    pub fn run(
-        &mut self,
-        prepared: &Prepared,
-        inputs: &HashMap<&str, &[u8]>,
-        options: &RunOptions<'_>,
-    ) -> Result<Outputs, GpuError> {
-        let deadline = options.timeout.map(|t| Instant::now() + t);
-        self.run_until(prepared, inputs, options, deadline).map_err(|e| match (e, options.timeout) {
-            (GpuError::Timeout { node, .. }, Some(t)) => GpuError::Timeout { node, seconds: t.as_secs() },
-            (e, _) => e,
-        })
+    /// Forgets all values of earlier frames: the next frame is a first one.
+    pub fn forget(&mut self) {
+        self.histories.clear();
     }
 
-    fn run_until(
+    /// Uploads, runs, and brings back. `inputs` are the host's bytes of each external.
+    pub fn run(&mut self, prepared: &Prepared, inputs: &HashMap<&str, &[u8]>, options: &RunOptions<'_>) -> Result<Outputs, GpuError> {
+        let mut fetched = IndexMap::new();
+        for fetch in &prepared.plan.fetches {
+            let bytes = fetch.parts.iter().map(|(_, range)| range.end).max().unwrap_or(0);
+            fetched.insert(fetch.name.clone(), vec![0; bytes as usize]);
+        }
+        let timings = self.run_into(prepared, inputs, options, &mut |part| {
+            if let Some(whole) = fetched.get_mut(part.name) {
+                copy_out(&mut whole[part.range.start as usize..part.range.end as usize], part.bytes);
+            }
+        })?;
+        Ok(Outputs { fetched, timings })
+    }
+
+    /// Like [`Executor::run`], but hands the bytes that come back out as they arrive, still in mapped memory, without
+    /// a copy: parts of a fetch in the order of the plan, each in one or more pieces.
+    pub fn run_into(
         &mut self,
         prepared: &Prepared,
         inputs: &HashMap<&str, &[u8]>,
         options: &RunOptions<'_>,
-        deadline: Option<Instant>,
-    ) -> Result<Outputs, GpuError> {
+        take: &mut dyn FnMut(Part<'_>),
+    ) -> Result<Timings, GpuError> {
         let plan = &prepared.plan;
-        let mut outputs = Outputs::default();
+        let patience = Patience::new(options.timeout, options.cancel);
+        let mut timings = Timings::default();
+
         let started = Instant::now();
         for upload in &plan.uploads {
             let source = inputs.get(upload.name.as_str()).copied().unwrap_or_default();
@@ -204,242 +199,58 @@ impl Executor {
             if (source.len() as u64) < wanted {
                 return Err(GpuError::ShortInput { name: upload.name.clone(), got: source.len() as u64, wanted });
             }
-            self.transfer.upload(&self.device, buffer(&prepared.memory, upload.slot), source, &upload.ranges, deadline)?;
+            let buffer = memory(prepared, upload.slot)?.buffer(&plan.name)?;
+            self.transfer.upload(&self.device, buffer, source, &upload.ranges, &patience, &upload.name)?;
         }
-        outputs.timings.upload_ms = millis(started);
+        timings.upload_ms = millis(started);
 
         let started = Instant::now();
-        self.recall(prepared);
-        let mut recorder = Recorder::new(&self.device, *options, deadline);
-        for step in &prepared.steps {
-            step.record(&mut recorder, &mut self.transfer, &prepared.memory)?;
-        }
-        recorder.finish()?;
-        outputs.timings.passes = recorder.into_times();
-        outputs.timings.compute_ms = millis(started);
-        self.keep(prepared)?;
+        self.histories.recall(&self.device, plan, &prepared.memory);
+        let costs = prepared.costs.lock().unwrap_or_else(PoisonError::into_inner).clone();
+        let mut recorder = Recorder::new(&self.device, &mut self.transfer, &prepared.names, costs, *options, patience);
+        recorder.steps(&prepared.steps)?;
+        let (passes, learned) = recorder.finish()?;
+        *prepared.costs.lock().unwrap_or_else(PoisonError::into_inner) = learned;
+        timings.passes = passes;
+        timings.compute_ms = millis(started);
 
         let started = Instant::now();
-        let mut parts = Vec::new();
-        for fetch in &plan.fetches {
-            let bytes = fetch.parts.iter().map(|(_, range)| range.end).max().unwrap_or(0);
-            outputs.fetched.insert(fetch.name.clone(), vec![0; bytes as usize]);
-            parts.extend(fetch.parts.iter().map(|(slot, range)| (fetch.name.as_str(), *slot, range.clone())));
-        }
-        let buffers: Vec<_> = parts.iter().map(|(_, slot, range)| (buffer(&prepared.memory, *slot), range.end - range.start)).collect();
-        let fetched = &mut outputs.fetched;
-        self.transfer.download(&self.device, &buffers, deadline, |i, from| {
-            let (name, _, range) = &parts[i];
-            if let Some(whole) = fetched.get_mut(*name) {
-                copy_out(&mut whole[range.start as usize..range.end as usize], from);
-            }
+        self.histories.keep(&self.device, plan, &prepared.memory)?;
+        let parts: Vec<_> =
+            plan.fetches.iter().flat_map(|f| f.parts.iter().map(|(slot, range)| (f.name.as_str(), *slot, range))).collect();
+        let one = |(_, slot, range): &(&str, _, &Range<u64>)| Ok((memory(prepared, *slot)?.buffer(&plan.name)?, range.end - range.start));
+        let buffers = parts.iter().map(one).collect::<Result<Vec<_>, GpuError>>()?;
+        self.transfer.download(&self.device, &buffers, &patience, &plan.name, &mut |i, at, bytes| {
+            let (name, _, range) = parts[i];
+            let start = range.start + at;
+            take(Part { name, range: start..start + bytes.len() as u64, bytes });
         })?;
-        outputs.timings.readback_ms = millis(started);
-        Ok(outputs)
+        timings.readback_ms = millis(started);
+        Ok(timings)
     }
 
-    /// Fills the slots of histories with the values of `delay` frames ago.
-    fn recall(&self, prepared: &Prepared) {
-        let mut encoder = self.device.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
-        for history in &prepared.plan.histories {
-            let (Some(slot), Some(ring)) = (history.recall, self.histories.get(&history.name)) else { continue };
-            if let Some(old) = ring.len().checked_sub(history.delay as usize).and_then(|i| ring.get(i)) {
-                copy(&mut encoder, old, &prepared.memory[slot.0 as usize]);
-            }
-        }
-        self.device.queue.submit([encoder.finish()]);
-    }
-
-    /// Keeps the new values of histories.
-    fn keep(&mut self, prepared: &Prepared) -> Result<(), GpuError> {
-        for history in &prepared.plan.histories {
-            let ring = self.histories.entry(history.name.clone()).or_default();
-            let slot = &prepared.plan.slots[history.keep.0 as usize];
-            let memory = if ring.len() >= history.delay as usize {
-                ring.pop_front().expect("a delay is at least 1")
-            } else {
-                allocate(&self.device, slot, false, &history.name)?
-            };
-            let mut encoder = self.device.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
-            copy(&mut encoder, &prepared.memory[history.keep.0 as usize], &memory);
-            self.device.queue.submit([encoder.finish()]);
-            self.histories.entry(history.name.clone()).or_default().push_back(memory);
+    fn write_literals(&mut self, prepared: &Prepared) -> Result<(), GpuError> {
+        let plan = &prepared.plan;
+        for (slot, bytes) in &plan.literals {
+            let (buffer, all) = (memory(prepared, *slot)?.buffer(&plan.name)?, 0..bytes.len() as u64);
+            self.transfer.upload(&self.device, buffer, bytes, std::slice::from_ref(&all), &Patience::default(), &plan.name)?;
         }
         Ok(())
     }
+}
 
-    /// Forgets all histories: the next frame is a first one.
-    pub fn forget(&mut self) {
-        self.histories.clear();
-    }
+fn memory(prepared: &Prepared, slot: pipe_plan::plan::SlotId) -> Result<&Memory, GpuError> {
+    let missing = || GpuError::Plan { node: prepared.plan.name.clone(), reason: format!("there is no slot {}", slot.0) };
+    prepared.memory.get(slot.0 as usize).ok_or_else(missing)
 }
 
 fn millis(since: Instant) -> f64 {
     since.elapsed().as_secs_f64() * 1e3
 }
 
+/// Uniform blocks start at multiples of 256, so the buffer ends at one.
 fn pad(bytes: &[u8]) -> Vec<u8> {
     let mut padded = bytes.to_vec();
     padded.resize(bytes.len().next_multiple_of(256), 0);
     padded
-}
-
-/// Gives each kernel the name of the first pass that launches it.
-fn name_kernels(steps: &[Step], nodes: &mut [String]) {
-    for step in steps.iter().rev() {
-        match step {
-            Step::Run(run) => nodes[run.kernel.0 as usize].clone_from(&run.name),
-            Step::Repeat(r) => [&r.even, &r.odd, &r.first].into_iter().for_each(|s| name_kernels(s, nodes)),
-        }
-    }
-}
-
-fn buffer(memory: &[Memory], slot: SlotId) -> &wgpu::Buffer {
-    match &memory[slot.0 as usize] {
-        Memory::Buffer(buffer) => buffer,
-        Memory::Texture { .. } => unreachable!("plans upload to and fetch from buffers only"),
-    }
-}
-
-fn copy(encoder: &mut wgpu::CommandEncoder, from: &Memory, to: &Memory) {
-    match (from, to) {
-        (Memory::Texture { texture: from, .. }, Memory::Texture { texture: to, .. }) => {
-            encoder.copy_texture_to_texture(from.as_image_copy(), to.as_image_copy(), from.size());
-        }
-        (Memory::Buffer(from), Memory::Buffer(to)) => encoder.copy_buffer_to_buffer(from, 0, to, 0, from.size().min(to.size())),
-        _ => unreachable!("copies are between slots of equal storage"),
-    }
-}
-
-/// Makes steps ready.
-struct Maker<'a> {
-    device: &'a Device,
-    plan: &'a Plan,
-    memory: &'a [Memory],
-    uniforms: Option<&'a wgpu::Buffer>,
-    pipelines: &'a [Arc<Pipeline>],
-}
-
-impl Maker<'_> {
-    fn ready(&self, step: &Step) -> Ready {
-        let all = |steps: &[Step]| steps.iter().map(|s| self.ready(s)).collect();
-        match step {
-            Step::Run(run) => Ready::Run(self.run(run)),
-            Step::Repeat(r) => {
-                let repeat = Repeat { first: Vec::new(), odd: Vec::new(), even: Vec::new(), ..r.clone() };
-                Ready::Repeat(ReadyRepeat { first: all(&r.first), odd: all(&r.odd), even: all(&r.even), repeat })
-            }
-        }
-    }
-
-    fn run(&self, run: &Run) -> ReadyRun {
-        let kernel = &self.plan.kernels[run.kernel.0 as usize];
-        let pipeline = self.pipelines[run.kernel.0 as usize].clone();
-        let mut slots = run.slots.iter();
-        let mut entries = Vec::new();
-        for (i, binding) in kernel.bindings.iter().enumerate() {
-            let resource = match binding {
-                Binding::Uniform { bytes } => wgpu::BindingResource::Buffer(wgpu::BufferBinding {
-                    buffer: self.uniforms.expect("a plan with uniform blocks has a uniform buffer"),
-                    offset: run.uniform_offset.into(),
-                    size: std::num::NonZeroU64::new((*bytes).into()),
-                }),
-                _ => {
-                    let slot = slots.next().expect("a plan names a slot for each binding");
-                    match &self.memory[slot.0 as usize] {
-                        Memory::Texture { view, .. } => wgpu::BindingResource::TextureView(view),
-                        Memory::Buffer(buffer) => buffer.as_entire_binding(),
-                    }
-                }
-            };
-            entries.push(wgpu::BindGroupEntry { binding: i as u32, resource });
-        }
-        // The slot that is left is the target that points are drawn into.
-        let target = slots.next().map(|slot| match &self.memory[slot.0 as usize] {
-            Memory::Texture { view, .. } => view.clone(),
-            Memory::Buffer(_) => unreachable!("points are drawn into images"),
-        });
-        let group = self.device.device.create_bind_group(&wgpu::BindGroupDescriptor {
-            label: Some(&run.name),
-            layout: &pipeline.layout,
-            entries: &entries,
-        });
-        let clears = run.clears.iter().filter(|_| target.is_none()).map(|slot| buffer(self.memory, *slot).clone()).collect();
-        ReadyRun { name: run.name.clone(), pipeline, group, groups: run.groups, clears, target }
-    }
-}
-
-impl Ready {
-    fn record(&self, recorder: &mut Recorder<'_>, transfer: &mut Transfer, memory: &[Memory]) -> Result<(), GpuError> {
-        match self {
-            Self::Run(run) => recorder.run(run),
-            Self::Repeat(r) => r.record(recorder, transfer, memory),
-        }
-    }
-}
-
-impl ReadyRepeat {
-    fn record(&self, recorder: &mut Recorder<'_>, transfer: &mut Transfer, memory: &[Memory]) -> Result<(), GpuError> {
-        let (most, until) = match self.repeat.count {
-            Times::Fixed(n) => (n, None),
-            Times::Until { value, limit, every, max } => (max, Some((value, limit, every))),
-        };
-        let mut last = 0;
-        for i in 0..most {
-            let body = match i {
-                0 => &self.first,
-                i if i % 2 == 1 => &self.odd,
-                _ => &self.even,
-            };
-            for step in body {
-                step.record(recorder, transfer, memory)?;
-            }
-            last = i;
-            recorder.progress(i + 1, most);
-            if let Some((value, limit, every)) = until
-                && (i + 1) % every == 0
-            {
-                recorder.submit()?;
-                let slot = value[(i % 2) as usize];
-                let mut now = f32::NAN;
-                transfer.download(recorder.device(), &[(buffer(memory, slot), 4)], recorder.deadline(), |_, bytes| {
-                    now = f32::from_le_bytes([bytes[0], bytes[1], bytes[2], bytes[3]]);
-                })?;
-                if now < limit {
-                    break;
-                }
-            }
-        }
-        if until.is_some() && last % 2 == 0 {
-            for (from, to) in &self.repeat.settle {
-                recorder.copy(|encoder| copy(encoder, &memory[from.0 as usize], &memory[to.0 as usize]));
-            }
-        }
-        Ok(())
-    }
-}
-
-impl RunOptions<'_> {
-    pub(crate) fn cancelled(&self) -> bool {
-        self.cancel.is_some_and(|c| c.load(Ordering::Relaxed))
-    }
-}
-
-impl Prepared {
-    /// The plan.
-    pub fn plan(&self) -> &Arc<Plan> {
-        &self.plan
-    }
-
-    /// How many pipelines it uses.
-    pub fn pipeline_count(&self) -> usize {
-        self.pipelines.len()
-    }
-}
-
-impl Drop for Executor {
-    fn drop(&mut self) {
-        // Work in flight ends before its memory goes; a lost device answers at once.
-        let _ = wait(&self.device, None, Some(Instant::now() + Duration::from_secs(5)), "exit");
-    }
 }

@@ -26,6 +26,7 @@ pub(crate) const fn of_volume(t: VolumeType) -> TextureFormat {
 
 /// What one texture format allows on an adapter.
 #[derive(Debug, Clone, PartialEq, Eq, serde::Serialize)]
+#[allow(clippy::struct_excessive_bools, reason = "a row of a table of yes and no")]
 pub struct FormatSupport {
     /// Its WGSL name.
     pub format: String,

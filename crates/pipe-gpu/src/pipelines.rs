@@ -1,14 +1,29 @@
 //! Kernels → pipelines: compiled in parallel, kept for the life of the executor, cached on disk where the driver can.
+//!
+//! Layouts are explicit, made from what the plan says a kernel binds; so a shader that disagrees with its plan is
+//! refused when it is compiled, not when it runs. Uniform blocks are bound at their own offset, since a bind group for
+//! each launch is made once anyway; dynamic offsets would save nothing.
+//!
+//! Compilers recurse over expressions (naga 30 overflows 2 MiB at about 5,000 chained terms, drivers are no better), so
+//! kernels are compiled on threads of their own with a deep stack.
 
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
+use pipe_graph::types::Precision;
 use pipe_plan::plan::{Binding, Kernel, Launch};
 use rayon::prelude::*;
 
 use crate::device::Device;
 use crate::error::GpuError;
 use crate::formats;
+
+/// Stack of a compiling thread. Only what is touched is ever taken.
+const STACK: usize = 256 << 20;
+
+/// Kernels kept; beyond it, those that the current plan does not use are dropped.
+const MOST: usize = 2048;
 
 /// A compiled kernel.
 pub(crate) struct Pipeline {
@@ -25,7 +40,8 @@ pub(crate) enum Compiled {
 /// All pipelines made so far.
 #[derive(Default)]
 pub(crate) struct Pipelines {
-    made: HashMap<Kernel, std::sync::Arc<Pipeline>>,
+    threads: Option<rayon::ThreadPool>,
+    made: HashMap<Kernel, Arc<Pipeline>>,
     disk: Option<Disk>,
 }
 
@@ -39,7 +55,7 @@ struct Disk {
 impl Pipelines {
     /// Uses a folder to remember what the driver compiled. No trouble with it is an error: it is only a cache.
     pub(crate) fn with_cache(device: &Device, folder: &Path) -> Self {
-        if !device.features.contains(wgpu::Features::PIPELINE_CACHE) {
+        if !device.has(wgpu::Features::PIPELINE_CACHE) {
             return Self::default();
         }
         let Some(key) = wgpu::util::pipeline_cache_key(&device.info) else { return Self::default() };
@@ -54,7 +70,7 @@ impl Pipelines {
         // the file's name says; it was written whole and renamed, so it is never half a file.
         #[allow(unsafe_code)]
         let cache = unsafe { device.device.create_pipeline_cache(&desc) };
-        Self { made: HashMap::new(), disk: Some(Disk { cache, file, known }) }
+        Self { disk: Some(Disk { cache, file, known }), ..Self::default() }
     }
 
     /// Compiles what is not there yet; `nodes[i]` names kernel i in messages.
@@ -63,15 +79,34 @@ impl Pipelines {
         device: &Device,
         kernels: &[Kernel],
         nodes: &[String],
-    ) -> Result<Vec<std::sync::Arc<Pipeline>>, GpuError> {
+    ) -> Result<Vec<Arc<Pipeline>>, GpuError> {
         let missing: Vec<usize> = (0..kernels.len()).filter(|i| !self.made.contains_key(&kernels[*i])).collect();
-        let cache = self.disk.as_ref().map(|d| &d.cache);
-        let made: Vec<Result<Pipeline, GpuError>> = missing.par_iter().map(|i| compile(device, &kernels[*i], &nodes[*i], cache)).collect();
-        for (i, pipeline) in missing.into_iter().zip(made) {
-            self.made.insert(kernels[i].clone(), std::sync::Arc::new(pipeline?));
+        if !missing.is_empty() {
+            let cache = self.disk.as_ref().map(|d| &d.cache);
+            let all = || missing.par_iter().map(|i| compile(device, &kernels[*i], &nodes[*i], cache)).collect();
+            if self.threads.is_none() {
+                self.threads = rayon::ThreadPoolBuilder::new().stack_size(STACK).thread_name(|i| format!("compile {i}")).build().ok();
+            }
+            let made: Vec<Result<Pipeline, GpuError>> = match &self.threads {
+                Some(threads) => threads.install(all),
+                None => all(),
+            };
+            // The first in the order of the plan, so that the same mistakes give the same message.
+            let mut first = Ok(());
+            for (i, pipeline) in missing.into_iter().zip(made) {
+                match pipeline {
+                    Ok(pipeline) => drop(self.made.insert(kernels[i].clone(), Arc::new(pipeline))),
+                    Err(e) => first = first.and(Err(e)),
+                }
+            }
+            first?;
+            self.save();
         }
-        self.save();
-        Ok(kernels.iter().map(|k| self.made[k].clone()).collect())
+        let used = kernels.iter().map(|k| self.made[k].clone()).collect();
+        if self.made.len() > MOST {
+            self.made.retain(|k, _| kernels.contains(k));
+        }
+        Ok(used)
     }
 
     fn save(&mut self) {
@@ -120,7 +155,13 @@ fn layout_entry(binding: u32, kind: Binding, launch: Launch) -> wgpu::BindGroupL
 
 fn compile(device: &Device, kernel: &Kernel, node: &str, cache: Option<&wgpu::PipelineCache>) -> Result<Pipeline, GpuError> {
     let gpu = &device.device;
-    let scope = gpu.push_error_scope(wgpu::ErrorFilter::Validation);
+    if let Launch::Points(target) = kernel.launch
+        && target.precision == Precision::F32
+        && !device.has_float_blending()
+    {
+        return Err(GpuError::Unsupported { node: node.to_owned(), what: "blending into 32-bit float images" });
+    }
+    let scopes = [wgpu::ErrorFilter::OutOfMemory, wgpu::ErrorFilter::Internal, wgpu::ErrorFilter::Validation].map(|f| gpu.push_error_scope(f));
     let desc = wgpu::ShaderModuleDescriptor {
         label: Some(&kernel.label),
         source: wgpu::ShaderSource::Wgsl(std::borrow::Cow::Borrowed(&kernel.wgsl)),
@@ -186,10 +227,11 @@ fn compile(device: &Device, kernel: &Kernel, node: &str, cache: Option<&wgpu::Pi
             }))
         }
     };
-    match pollster::block_on(scope.pop()) {
-        Some(error) => {
-            Err(GpuError::Shader { node: node.to_owned(), label: kernel.label.clone(), message: error.to_string() })
-        }
+    // Scopes end in the opposite order. What validation says comes first: it is about the shader.
+    let errors: Vec<wgpu::Error> = scopes.into_iter().rev().filter_map(|scope| pollster::block_on(scope.pop())).collect();
+    match errors.into_iter().next() {
         None => Ok(Pipeline { layout, launch }),
+        Some(wgpu::Error::OutOfMemory { .. }) => Err(GpuError::OutOfMemory { what: node.to_owned(), bytes: 0 }),
+        Some(error) => Err(GpuError::Shader { node: node.to_owned(), label: kernel.label.clone(), message: error.to_string() }),
     }
 }

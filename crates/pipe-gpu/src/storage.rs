@@ -1,17 +1,52 @@
 //! Slots → textures and buffers, kept for reuse across plans and frames.
+//!
+//! A slot is reused for one that equals it, never for a smaller one: plans of one graph at one size are what comes
+//! again and again (frames, `watch`), and equal slots make that exact. Everything is checked against the device and
+//! the budget before the first byte is allocated, so a plan that cannot run fails before it slowed anything down.
 
-use pipe_plan::plan::{Launch, Plan, Slot, Storage};
+use pipe_plan::plan::{Launch, Plan, Slot, SlotId, Storage};
 use wgpu::{BufferUsages, TextureUsages};
 
 use crate::device::Device;
-use crate::error::GpuError;
+use crate::error::{GpuError, size};
 use crate::formats;
 
 /// One physical resource.
-#[derive(Clone)]
+#[derive(Debug, Clone)]
 pub(crate) enum Memory {
     Texture { texture: wgpu::Texture, view: wgpu::TextureView },
     Buffer(wgpu::Buffer),
+}
+
+impl Memory {
+    /// Copies all of it to memory of the same storage.
+    pub(crate) fn copy_to(&self, to: &Self, encoder: &mut wgpu::CommandEncoder) {
+        match (self, to) {
+            (Self::Texture { texture: from, .. }, Self::Texture { texture: to, .. }) => {
+                encoder.copy_texture_to_texture(from.as_image_copy(), to.as_image_copy(), from.size());
+            }
+            (Self::Buffer(from), Self::Buffer(to)) => encoder.copy_buffer_to_buffer(from, 0, to, 0, from.size().min(to.size())),
+            _ => unreachable!("copies are between slots of equal storage"),
+        }
+    }
+
+    /// Fills it with zeros. Textures need `CLEAR_TEXTURE`, which [`check`] looks after.
+    pub(crate) fn zero(&self, encoder: &mut wgpu::CommandEncoder) {
+        match self {
+            Self::Texture { texture, .. } => encoder.clear_texture(texture, &wgpu::ImageSubresourceRange::default()),
+            Self::Buffer(buffer) => encoder.clear_buffer(buffer, 0, None),
+        }
+    }
+
+    /// The buffer that it is.
+    pub(crate) fn buffer(&self, plan: &str) -> Result<&wgpu::Buffer, GpuError> {
+        match self {
+            Self::Buffer(buffer) => Ok(buffer),
+            Self::Texture { .. } => {
+                Err(GpuError::Plan { node: plan.to_owned(), reason: "bytes cross between host and device in buffers only".into() })
+            }
+        }
+    }
 }
 
 /// Memory that no plan uses at present.
@@ -21,21 +56,19 @@ pub(crate) struct Pool {
 }
 
 impl Pool {
-    /// Memory for every slot of a plan. What no slot took is freed first when it is not of use any more.
+    /// Memory for every slot of a plan. What no slot took is freed before anything is allocated.
     pub(crate) fn take(&mut self, device: &Device, plan: &Plan) -> Result<Vec<Memory>, GpuError> {
-        let target = |i: usize| is_target(plan, i);
         let mut taken: Vec<Option<Memory>> = Vec::with_capacity(plan.slots.len());
         for (i, slot) in plan.slots.iter().enumerate() {
-            let found = self.free.iter().position(|(s, t, _)| s == slot && *t == target(i));
+            let found = self.free.iter().position(|(s, t, _)| s == slot && *t == is_target(plan, i));
             taken.push(found.map(|at| self.free.swap_remove(at).2));
         }
-        // Nothing new is allocated while memory that fits nothing is held.
         self.free.clear();
         let mut all = Vec::with_capacity(taken.len());
         for (i, memory) in taken.into_iter().enumerate() {
             all.push(match memory {
                 Some(memory) => memory,
-                None => allocate(device, &plan.slots[i], target(i), &plan.name)?,
+                None => allocate(device, &plan.slots[i], is_target(plan, i), &plan.name)?,
             });
         }
         Ok(all)
@@ -49,17 +82,83 @@ impl Pool {
     }
 }
 
+/// Bytes that a plan's slots and kept frames take.
+pub(crate) fn bytes_needed(plan: &Plan) -> u64 {
+    let slots: u64 = plan.slots.iter().map(|s| s.storage.bytes()).sum();
+    let kept = plan.histories.iter().filter_map(|h| Some(u64::from(h.delay) * slot(plan, h.keep)?.storage.bytes()));
+    slots + kept.sum::<u64>()
+}
+
+/// Whether a device can hold a plan within a budget in bytes.
+pub(crate) fn check(device: &Device, plan: &Plan, budget: Option<u64>) -> Result<(), GpuError> {
+    let limits = device.limits();
+    for (i, slot) in plan.slots.iter().enumerate() {
+        let what = || format!("{}: slot {i}", plan.name);
+        let (extent, most) = match slot.storage {
+            Storage::Image(t) => (t.size.to_vec(), limits.max_image),
+            Storage::Volume(t) => (t.size.to_vec(), limits.max_volume),
+            Storage::Buffer { bytes } => {
+                let most = limits.max_binding_bytes.min(device.max_buffer);
+                if bytes > most {
+                    return Err(GpuError::TooLarge {
+                        what: what(),
+                        size: format!("a buffer of {}", size(bytes)),
+                        limit: size(most),
+                    });
+                }
+                (Vec::new(), 0)
+            }
+        };
+        if extent.iter().any(|n| *n > most) {
+            let sides: Vec<String> = extent.iter().map(u32::to_string).collect();
+            let kind = if extent.len() == 2 { "an image" } else { "a volume" };
+            return Err(GpuError::TooLarge {
+                what: what(),
+                size: format!("{kind} of {}", sides.join("x")),
+                limit: format!("{most} along each side"),
+            });
+        }
+    }
+    let needed = bytes_needed(plan);
+    match budget.into_iter().chain(plan.limits.budget).min() {
+        Some(budget) if needed > budget => {
+            Err(GpuError::OverBudget { what: plan.name.clone(), needed, budget, largest: largest(plan) })
+        }
+        _ => Ok(()),
+    }
+}
+
+fn slot(plan: &Plan, id: SlotId) -> Option<&Slot> {
+    plan.slots.get(id.0 as usize)
+}
+
+/// The three largest slots, in words.
+fn largest(plan: &Plan) -> String {
+    let mut order: Vec<usize> = (0..plan.slots.len()).collect();
+    order.sort_by_key(|i| std::cmp::Reverse(plan.slots[*i].storage.bytes()));
+    let one = |i: &usize| {
+        let storage = plan.slots[*i].storage;
+        let form = match storage {
+            Storage::Image(t) => format!("image {}x{} of {} channels", t.size[0], t.size[1], t.channels),
+            Storage::Volume(t) => format!("volume {}x{}x{} of {} channels", t.size[0], t.size[1], t.size[2], t.channels),
+            Storage::Buffer { .. } => "buffer".to_owned(),
+        };
+        format!("slot {i} ({form}, {})", size(storage.bytes()))
+    };
+    order.iter().take(3).map(one).collect::<Vec<_>>().join(", ")
+}
+
 /// Whether points are drawn into a slot; such kernels name their target's format.
 fn is_target(plan: &Plan, slot: usize) -> bool {
     let Storage::Image(image) = plan.slots[slot].storage else { return false };
     plan.kernels.iter().any(|k| k.launch == Launch::Points(image))
 }
 
-/// Memory outside any slot, of the same kind as a slot's.
+/// Memory of the kind that a slot has.
 pub(crate) fn allocate(device: &Device, slot: &Slot, target: bool, what: &str) -> Result<Memory, GpuError> {
     let gpu = &device.device;
     let scope = gpu.push_error_scope(wgpu::ErrorFilter::OutOfMemory);
-    let texture = |size: wgpu::Extent3d, dimension, format| {
+    let texture = |size: [u32; 3], dimension, format| {
         // COPY_DST keeps wgpu from clearing the texture with a render pass at its first use.
         let mut usage =
             TextureUsages::TEXTURE_BINDING | TextureUsages::STORAGE_BINDING | TextureUsages::COPY_SRC | TextureUsages::COPY_DST;
@@ -68,7 +167,7 @@ pub(crate) fn allocate(device: &Device, slot: &Slot, target: bool, what: &str) -
         }
         let texture = gpu.create_texture(&wgpu::TextureDescriptor {
             label: Some(what),
-            size,
+            size: wgpu::Extent3d { width: size[0], height: size[1], depth_or_array_layers: size[2] },
             mip_level_count: 1,
             sample_count: 1,
             dimension,
@@ -79,13 +178,12 @@ pub(crate) fn allocate(device: &Device, slot: &Slot, target: bool, what: &str) -
         let view = texture.create_view(&wgpu::TextureViewDescriptor::default());
         Memory::Texture { texture, view }
     };
-    let extent = |w, h, d| wgpu::Extent3d { width: w, height: h, depth_or_array_layers: d };
     let memory = match slot.storage {
-        Storage::Image(t) => texture(extent(t.size[0], t.size[1], 1), wgpu::TextureDimension::D2, formats::of_image(t)),
-        Storage::Volume(t) => texture(extent(t.size[0], t.size[1], t.size[2]), wgpu::TextureDimension::D3, formats::of_volume(t)),
+        Storage::Image(t) => texture([t.size[0], t.size[1], 1], wgpu::TextureDimension::D2, formats::of_image(t)),
+        Storage::Volume(t) => texture(t.size, wgpu::TextureDimension::D3, formats::of_volume(t)),
         Storage::Buffer { bytes } => {
             let mut usage = BufferUsages::STORAGE | BufferUsages::COPY_SRC | BufferUsages::COPY_DST;
-            if device.mappable() {
+            if device.shares_memory() {
                 if slot.uploaded {
                     usage |= BufferUsages::MAP_WRITE;
                 }

@@ -1,0 +1,178 @@
+//! Adapters: what there is, and which one is taken.
+//!
+//! Vulkan, Metal and DirectX 12; OpenGL only when the caller asks, because its drivers differ too much in what
+//! compute shaders may do. A software renderer is a full citizen, taken when there is nothing better.
+
+use pipe_graph::pass::{Limits, Profile};
+use wgpu::{Backends, DeviceType, Features};
+
+use crate::error::GpuError;
+use crate::formats::{self, FormatSupport};
+
+/// Which device to take.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub enum Choice {
+    /// Discrete, then integrated, then virtual, then software.
+    #[default]
+    Best,
+    /// The n-th of `pipe devices`.
+    Index(usize),
+    /// The first whose name contains this, in any case.
+    Name(String),
+    /// A software renderer.
+    Cpu,
+}
+
+impl Choice {
+    /// Reads `--device`: a number, `cpu`, or part of a name. Nothing, or `best`, is [`Choice::Best`].
+    pub fn parse(text: &str) -> Self {
+        match text.trim() {
+            "" | "best" => Self::Best,
+            t if t.eq_ignore_ascii_case("cpu") => Self::Cpu,
+            t => t.parse().map_or_else(|_| Self::Name(t.to_owned()), Self::Index),
+        }
+    }
+}
+
+/// How devices are looked for and opened.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct OpenOptions {
+    /// Look for OpenGL adapters too. They are found only by builds of wgpu with its feature `gles`.
+    pub opengl: bool,
+    /// On software adapters, map the buffers that kernels use instead of copying through staging buffers. Turned off
+    /// to exercise on such a machine what a GPU does.
+    pub share_memory: bool,
+}
+
+impl Default for OpenOptions {
+    fn default() -> Self {
+        Self { opengl: false, share_memory: true }
+    }
+}
+
+/// What is known of an adapter before it is opened.
+#[derive(Debug, Clone, serde::Serialize)]
+pub struct AdapterDescription {
+    /// Position for `--device N`.
+    pub index: usize,
+    /// Its name.
+    pub name: String,
+    /// `discrete`, `integrated`, `virtual`, `software`, `other`.
+    pub kind: &'static str,
+    /// The interface: vulkan, metal, dx12.
+    pub backend: String,
+    /// Driver and version.
+    pub driver: String,
+    /// What a plan would be made for.
+    pub limits: Limits,
+    /// Features that pipe uses and the adapter has.
+    pub features: Vec<String>,
+    /// What texture formats allow.
+    pub formats: Vec<FormatSupport>,
+}
+
+/// All adapters, the preferred one first.
+pub fn enumerate() -> Vec<AdapterDescription> {
+    enumerate_with(OpenOptions::default())
+}
+
+/// All adapters that these options let us see, the preferred one first.
+pub fn enumerate_with(options: OpenOptions) -> Vec<AdapterDescription> {
+    adapters(options).iter().enumerate().map(|(index, a)| describe(index, a, options)).collect()
+}
+
+pub(crate) fn describe(index: usize, adapter: &wgpu::Adapter, options: OpenOptions) -> AdapterDescription {
+    let info = adapter.get_info();
+    AdapterDescription {
+        index,
+        name: info.name.clone(),
+        kind: rank(info.device_type).1,
+        backend: format!("{:?}", info.backend).to_lowercase(),
+        driver: format!("{} {}", info.driver, info.driver_info).trim().to_owned(),
+        limits: limits(adapter),
+        features: wanted(adapter, options).iter_names().map(|(name, _)| name.to_lowercase()).collect(),
+        formats: formats::support(adapter),
+    }
+}
+
+/// The adapter of a choice with its place in the list.
+pub(crate) fn choose(choice: &Choice, options: OpenOptions) -> Result<(usize, wgpu::Adapter), GpuError> {
+    let all = adapters(options);
+    if all.is_empty() {
+        return Err(GpuError::NoAdapter);
+    }
+    let names: Vec<String> = all.iter().map(|a| a.get_info().name).collect();
+    let fits = |(i, adapter): &(usize, wgpu::Adapter)| match choice {
+        Choice::Best => true,
+        Choice::Index(n) => i == n,
+        Choice::Name(name) => names[*i].to_lowercase().contains(&name.to_lowercase()),
+        Choice::Cpu => adapter.get_info().device_type == DeviceType::Cpu,
+    };
+    all.into_iter().enumerate().find(fits).ok_or_else(|| {
+        let wanted = match choice {
+            Choice::Best => "best".to_owned(),
+            Choice::Index(n) => n.to_string(),
+            Choice::Name(name) => name.clone(),
+            Choice::Cpu => "cpu".to_owned(),
+        };
+        let available: Vec<String> = names.iter().enumerate().map(|(i, n)| format!("{i}: {n}")).collect();
+        GpuError::NoSuchDevice { wanted, available: available.join(", ") }
+    })
+}
+
+const fn rank(kind: DeviceType) -> (u8, &'static str) {
+    match kind {
+        DeviceType::DiscreteGpu => (0, "discrete"),
+        DeviceType::IntegratedGpu => (1, "integrated"),
+        DeviceType::VirtualGpu => (2, "virtual"),
+        DeviceType::Other => (3, "other"),
+        DeviceType::Cpu => (4, "software"),
+    }
+}
+
+fn adapters(options: OpenOptions) -> Vec<wgpu::Adapter> {
+    let mut desc = wgpu::InstanceDescriptor::new_without_display_handle();
+    desc.backends = Backends::VULKAN | Backends::METAL | Backends::DX12;
+    if options.opengl {
+        desc.backends |= Backends::GL;
+    }
+    desc.flags = wgpu::InstanceFlags::empty();
+    let instance = wgpu::Instance::new(desc);
+    let mut list = pollster::block_on(instance.enumerate_adapters(Backends::all()));
+    // A stable sort: equal adapters stay in the driver's order.
+    list.sort_by_key(|a| rank(a.get_info().device_type).0);
+    list
+}
+
+/// Features that are used where they are present.
+pub(crate) fn wanted(adapter: &wgpu::Adapter, options: OpenOptions) -> Features {
+    let mut wanted = Features::TIMESTAMP_QUERY
+        | Features::TEXTURE_ADAPTER_SPECIFIC_FORMAT_FEATURES
+        | Features::PIPELINE_CACHE
+        | Features::CLEAR_TEXTURE
+        | Features::SUBGROUP
+        | Features::FLOAT32_BLENDABLE;
+    // On a GPU, buffers that the host can map lie in slow memory; on a CPU all memory is the same.
+    if options.share_memory && adapter.get_info().device_type == DeviceType::Cpu {
+        wanted |= Features::MAPPABLE_PRIMARY_BUFFERS;
+    }
+    wanted & adapter.features()
+}
+
+pub(crate) fn limits(adapter: &wgpu::Adapter) -> Limits {
+    let l = adapter.limits();
+    let half = [wgpu::TextureFormat::R16Float, wgpu::TextureFormat::Rg16Float];
+    let storable = |f| adapter.get_texture_format_features(f).allowed_usages.contains(wgpu::TextureUsages::STORAGE_BINDING);
+    Limits {
+        profile: if adapter.get_info().device_type == DeviceType::Cpu { Profile::Cpu } else { Profile::Gpu },
+        max_image: l.max_texture_dimension_2d,
+        max_volume: l.max_texture_dimension_3d,
+        max_binding_bytes: l.max_storage_buffer_binding_size.min(l.max_buffer_size) & !255,
+        max_sampled_images: l.max_sampled_textures_per_shader_stage,
+        max_storage_images: l.max_storage_textures_per_shader_stage,
+        max_storage_buffers: l.max_storage_buffers_per_shader_stage,
+        max_groups: l.max_compute_workgroups_per_dimension,
+        half_storage: adapter.features().contains(Features::TEXTURE_ADAPTER_SPECIFIC_FORMAT_FEATURES) && half.into_iter().all(storable),
+        budget: None,
+    }
+}
