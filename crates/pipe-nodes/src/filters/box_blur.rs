@@ -1,0 +1,82 @@
+//! `BoxBlur`: the mean over a square, at one cost for any radius.
+//!
+//! Along each axis a thread makes a run of pixels: the first sum is added up, the next ones add what enters and take away
+//! what leaves. Runs begin anew every [`RUN`] pixels (more for large radii), so rounding does not pile up, and a pixel that
+//! is not finite spoils no pixel beyond its run.
+
+use pipe_graph::prelude::*;
+use smart_default::SmartDefault;
+
+use crate::shader;
+
+/// The shortest run of one thread.
+const RUN: u32 = 32;
+
+/// The mean over (2r + 1)² pixels; its cost does not depend on the radius.
+///
+/// Sums run along lines and begin anew every few pixels; a value that is not finite may reach pixels up to two radii away.
+#[derive(Debug, SmartDefault, Serialize, Deserialize, JsonSchema)]
+#[serde(default)]
+pub(super) struct BoxBlur {
+    /// The image.
+    image: In<Image>,
+    /// Pixels to either side; 0 copies.
+    #[default = 1]
+    #[schemars(range(min = 0, max = 8192), extend("x-unit" = "px"))]
+    radius: u32,
+}
+
+pub(super) const KIND: Kind = Kind::of::<BoxBlur>(
+    "BoxBlur",
+    Category::Filters,
+    &[r#"BoxBlur(image: "in", radius: 2)"#, r#"BoxBlur(image: "grey", radius: 20)"#, r#"BoxBlur(image: "in", radius: 0)"#],
+)
+.tolerance(2e-6, 1e-5);
+
+impl Node for BoxBlur {
+    fn outputs(&self, inputs: &mut Inputs<'_>) -> Result<Vec<Output>, Mistake> {
+        Ok(Output::out(EdgeType::Image(inputs.image(&self.image))))
+    }
+
+    fn lower(&self, cx: &mut Lowering<'_>) -> Result<(), Mistake> {
+        let (image, out) = (cx.input(&self.image), cx.output("out"));
+        let shape = cx.shape(out);
+        let rows = cx.intermediate("rows", shape);
+        let r = self.radius;
+        let run = RUN.max(r);
+        let size = cx.image_of(out).size;
+        for (suffix, along_x, from, to) in [("rows", true, image, rows), ("columns", false, rows, out)] {
+            // A run also sees what entered and left since it began.
+            let reach = if along_x { Reach::Around(r + run, 0) } else { Reach::Around(0, r + run) };
+            let grid = if along_x { [size[0].div_ceil(run), size[1], 1] } else { [size[0], size[1].div_ceil(run), 1] };
+            cx.pass(suffix, shader!("filters/box_blur"))
+                .entry(Entry::Each)
+                .grid(Grid::Elements(grid))
+                .read("image", from, reach)
+                .write("out", to)
+                .constant("RADIUS", r as i32)
+                .constant("RUN", run as i32)
+                .constant("ALONG_X", along_x)
+                .add();
+        }
+        Ok(())
+    }
+
+    fn reference(&self, cx: &Reference<'_>) -> Vec<Tensor> {
+        let r = i64::from(self.radius);
+        let n = (2 * r + 1) as f64;
+        let pass = |image: &Raster, dx: i64, dy: i64| {
+            Raster::from_fn(image.size, image.channels, |x, y| {
+                let mut sum = [0.0; 4];
+                for k in -r..=r {
+                    let p = image.load(x + k * dx, y + k * dy, cx.border);
+                    for c in 0..4 {
+                        sum[c] += p[c] / n;
+                    }
+                }
+                sum
+            })
+        };
+        vec![Tensor::Image(pass(&pass(cx.image(&self.image), 1, 0), 0, 1))]
+    }
+}

@@ -1,0 +1,56 @@
+//! `Checkerboard`: squares of two colours.
+
+use pipe_graph::prelude::*;
+use smart_default::SmartDefault;
+
+use crate::shader;
+use crate::sources::canvas::{SIZE, image, paint};
+
+/// Squares of two colours; the square at the top left is `a`.
+#[derive(Debug, SmartDefault, Serialize, Deserialize, JsonSchema)]
+#[serde(default)]
+pub(super) struct Checkerboard {
+    /// The first colour.
+    #[default([0.2, 0.2, 0.2, 1.0])]
+    a: [f32; 4],
+    /// The second colour.
+    #[default([0.8, 0.8, 0.8, 1.0])]
+    b: [f32; 4],
+    /// Side of a square.
+    #[default = 32]
+    #[schemars(range(min = 1, max = 65536), extend("x-unit" = "px"))]
+    cell: u32,
+    /// Width and height.
+    #[default(SIZE)]
+    #[schemars(extend("x-unit" = "px"))]
+    size: [u32; 2],
+}
+
+pub(super) const KIND: Kind = Kind::of::<Checkerboard>(
+    "Checkerboard",
+    Category::Sources,
+    &[
+        r#"Checkerboard(size: (64, 48), cell: 8)"#,
+        r#"Checkerboard(size: (65, 31), cell: 7, a: (1, 0, 0, 1), b: (0, 0, 1, 0))"#,
+    ],
+)
+.tolerance(0.0, 0.0)
+.sets_alpha();
+
+impl Node for Checkerboard {
+    fn outputs(&self, _: &mut Inputs<'_>) -> Result<Vec<Output>, Mistake> {
+        image(self.size, 4)
+    }
+
+    fn lower(&self, cx: &mut Lowering<'_>) -> Result<(), Mistake> {
+        paint(cx, shader!("sources/checkerboard")).param("a", self.a).param("b", self.b).param("cell", self.cell as i32).add();
+        Ok(())
+    }
+
+    fn reference(&self, _: &Reference<'_>) -> Vec<Tensor> {
+        let cell = i64::from(self.cell);
+        vec![Tensor::Image(Raster::from_fn(self.size, 4, |x, y| {
+            if (x / cell + y / cell) % 2 == 0 { self.a.map(f64::from) } else { self.b.map(f64::from) }
+        }))]
+    }
+}

@@ -1,0 +1,45 @@
+//! `Constant`: one colour everywhere.
+
+use pipe_graph::prelude::*;
+use smart_default::SmartDefault;
+
+use crate::shader;
+use crate::sources::canvas::{SIZE, image, paint};
+
+/// One colour everywhere.
+#[derive(Debug, SmartDefault, Serialize, Deserialize, JsonSchema)]
+#[serde(default)]
+pub(super) struct Constant {
+    /// Red, green, blue, alpha; linear, alpha associated.
+    #[default([0.5, 0.5, 0.5, 1.0])]
+    color: [f32; 4],
+    /// Width and height.
+    #[default(SIZE)]
+    #[schemars(extend("x-unit" = "px"))]
+    size: [u32; 2],
+}
+
+pub(super) const KIND: Kind = Kind::of::<Constant>(
+    "Constant",
+    Category::Sources,
+    &[
+        r#"Constant(color: (1.0, 0.5, 0.25, 1.0), size: (64, 48))"#,
+    ],
+)
+.tolerance(0.0, 0.0)
+.sets_alpha();
+
+impl Node for Constant {
+    fn outputs(&self, _: &mut Inputs<'_>) -> Result<Vec<Output>, Mistake> {
+        image(self.size, 4)
+    }
+
+    fn lower(&self, cx: &mut Lowering<'_>) -> Result<(), Mistake> {
+        paint(cx, shader!("sources/constant")).param("color", self.color).add();
+        Ok(())
+    }
+
+    fn reference(&self, _: &Reference<'_>) -> Vec<Tensor> {
+        vec![Tensor::Image(Raster::from_fn(self.size, 4, |_, _| self.color.map(f64::from)))]
+    }
+}

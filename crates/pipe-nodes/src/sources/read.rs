@@ -1,0 +1,90 @@
+//! `ReadImage` and `ReadTable`: files as sources.
+
+use pipe_graph::prelude::*;
+
+/// An image file, converted to working space like a graph input; `file.exr#layer` names a layer.
+#[derive(Debug, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(default)]
+pub(super) struct ReadImage {
+    /// Path, relative to the graph file.
+    path: String,
+    #[serde(skip)]
+    found: Option<(String, ImageType)>,
+}
+
+pub(super) const READ_IMAGE: Kind = Kind::of::<ReadImage>("ReadImage", Category::Sources, &[]);
+
+impl Node for ReadImage {
+    fn open(&mut self, cx: &Opening<'_>) -> Result<(), Mistake> {
+        let path = cx.folder.join(&self.path);
+        let ty = cx.loader.image(&path).map_err(|reason| Mistake::in_field("path", format!("cannot be read: {reason}")))?;
+        self.found = Some((path.to_string_lossy().into_owned(), ty));
+        Ok(())
+    }
+
+    fn outputs(&self, _: &mut Inputs<'_>) -> Result<Vec<Output>, Mistake> {
+        let (_, ty) = self.found.as_ref().ok_or_else(|| Mistake::new("was not opened"))?;
+        Ok(Output::out(EdgeType::Image(*ty)))
+    }
+
+    fn file(&self) -> Option<FileSource> {
+        self.found.as_ref().map(|(path, _)| FileSource::Image(path.clone()))
+    }
+
+    fn lower(&self, cx: &mut Lowering<'_>) -> Result<(), Mistake> {
+        let file = cx.file();
+        cx.emit("out", file);
+        Ok(())
+    }
+
+    fn reference(&self, cx: &Reference<'_>) -> Vec<Tensor> {
+        cx.file.cloned().into_iter().collect()
+    }
+}
+
+/// A table file: csv, json or npy.
+#[derive(Debug, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(default)]
+pub(super) struct ReadTable {
+    /// Path, relative to the graph file.
+    path: String,
+    #[serde(skip)]
+    found: Option<TableFile>,
+}
+
+pub(super) const READ_TABLE: Kind = Kind::of::<ReadTable>("ReadTable", Category::Sources, &[]);
+
+impl Node for ReadTable {
+    fn open(&mut self, cx: &Opening<'_>) -> Result<(), Mistake> {
+        let path = cx.folder.join(&self.path);
+        let table = cx.loader.table(&path).map_err(|reason| Mistake::in_field("path", format!("cannot be read: {reason}")))?;
+        self.found = Some(table);
+        Ok(())
+    }
+
+    fn outputs(&self, _: &mut Inputs<'_>) -> Result<Vec<Output>, Mistake> {
+        Ok(Output::out(match &self.found {
+            Some(TableFile::F32(v)) => EdgeType::table(v.len() as u32, Element::F32),
+            Some(TableFile::U32(v)) => EdgeType::table(v.len() as u32, Element::U32),
+            None => return Err(Mistake::new("was not opened")),
+        }))
+    }
+
+    fn lower(&self, cx: &mut Lowering<'_>) -> Result<(), Mistake> {
+        let table = match &self.found {
+            Some(TableFile::F32(v)) => cx.floats("file", v),
+            Some(TableFile::U32(v)) => cx.uints("file", v),
+            None => return Err(Mistake::new("was not opened")),
+        };
+        cx.emit("out", table);
+        Ok(())
+    }
+
+    fn reference(&self, _: &Reference<'_>) -> Vec<Tensor> {
+        vec![Tensor::Table(match &self.found {
+            Some(TableFile::F32(v)) => v.iter().map(|v| f64::from(*v)).collect(),
+            Some(TableFile::U32(v)) => v.iter().map(|v| f64::from(*v)).collect(),
+            None => Vec::new(),
+        })]
+    }
+}

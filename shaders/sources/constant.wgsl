@@ -1,0 +1,5 @@
+// One colour.
+
+fn apply() -> vec4f {
+    return params.color;
+}
