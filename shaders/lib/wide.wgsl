@@ -119,6 +119,9 @@ fn bin_index(v: vec2f, lo: f32, hi: f32, bins: i32) -> i32 {
 
 /// How far into its bin v lies, 0..1, to the last digit even where bins are narrow and values large.
 fn bin_fraction(v: vec2f, lo: f32, hi: f32, bins: i32, bin: i32) -> f32 {
+    if v.x <= lo || v.x >= hi {
+        return select(0.0, 1.0, v.x >= hi);
+    }
     let left = wide_scale(wide_add(v, vec2f(-lo, 0.0)), f32(bins));
     let edge = wide_scale(two_sum(hi, -lo), f32(bin));
     return clamp(wide_add(left, -edge).x / (hi - lo), 0.0, 1.0);

@@ -133,8 +133,11 @@ impl Node for Clahe {
             let (rows, fy) = between(y, h, tiles[1]);
             let at = |row: usize, column: usize| self.through(&curves[(rows[row] * tiles[0] + columns[column]) as usize], luminance);
             let level = (at(0, 0) * (1.0 - fx) + at(0, 1) * fx) * (1.0 - fy) + (at(1, 0) * (1.0 - fx) + at(1, 1) * fx) * fy;
-            let scale = if luminance > 0.0 { level / luminance } else { 0.0 };
-            if image.channels == 1 { [level; 4] } else { [c[0] * scale, c[1] * scale, c[2] * scale, c[3]] }
+            match image.channels {
+                1 => [level; 4],
+                _ if luminance <= 0.0 => [0.0, 0.0, 0.0, c[3]],
+                _ => [c[0] / luminance * level, c[1] / luminance * level, c[2] / luminance * level, c[3]],
+            }
         }))]
     }
 }

@@ -20,7 +20,7 @@ pub(crate) struct Compare {
     /// What is measured. `Mse`: the mean of the squared differences of all colour channels. `Psnr`: the same in
     /// decibels, 10·log10(peak²/Mse), at most 200 dB, which equal images have. `Ssim`: the mean structural similarity of
     /// the luminances (Wang et al. 2004: Gaussian window, 11 taps, σ = 1.5), 1 for equal images. `Flip`: the mean
-    /// of the perceived difference (Andersson et al. 2020, LDR-FLIP), 0 for equal images; values are clipped to 0..1.
+    /// of the perceived difference (Andersson et al. 2020, LDR-FLIP), 0 for equal images; values are clipped to 0..1, NaN is black.
     metric: Metric,
     /// The value of white: the peak of `Psnr` and the range of `Ssim`.
     #[default = 1.0]

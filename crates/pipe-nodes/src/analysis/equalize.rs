@@ -91,8 +91,11 @@ impl Node for Equalize {
         vec![Tensor::Image(image.map(image.channels, |c| {
             let y = grey(c);
             let Some(bin) = binning.bin(y, low, high) else { return c };
-            let scale = if y > 0.0 { levels[bin] / y } else { 0.0 };
-            if image.channels == 1 { [levels[bin]; 4] } else { [c[0] * scale, c[1] * scale, c[2] * scale, c[3]] }
+            match image.channels {
+                1 => [levels[bin]; 4],
+                _ if y <= 0.0 => [0.0, 0.0, 0.0, c[3]],
+                _ => [c[0] / y * levels[bin], c[1] / y * levels[bin], c[2] / y * levels[bin], c[3]],
+            }
         }))]
     }
 }

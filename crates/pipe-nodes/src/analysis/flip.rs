@@ -174,7 +174,7 @@ impl<'a> Seen<'a> {
     fn new(image: &Raster, taps: &'a Taps) -> Self {
         // Achromatic, red–green, blue–yellow: linear relatives of L*, a*, b*.
         let opponent = image.map(4, |[r, g, b, _]| {
-            let [x, y, z] = relative_xyz([r, g, b].map(|v| v.clamp(0.0, 1.0)));
+            let [x, y, z] = relative_xyz([r, g, b].map(|v| if v.is_nan() { 0.0 } else { v.clamp(0.0, 1.0) }));
             [116.0 * y - 16.0, 500.0 * (x - y), 200.0 * (y - z), 1.0]
         });
         Self { opponent, taps }
@@ -214,5 +214,30 @@ impl<'a> Seen<'a> {
         let along_y = self.filtered(x, y, 0, &|i, j| smooth[i] * across[j]);
         // Of (L* + 16)/116; the weights sum to 0, so the constant does not matter.
         along_x.hypot(along_y) / 116.0
+    }
+}
+
+#[cfg(test)]
+pub(super) mod tests {
+    use super::*;
+
+    /// A small picture that is easily written elsewhere.
+    pub(in super::super) fn picture(k: i64) -> Raster {
+        Raster::from_fn([16, 12], 4, |x, y| {
+            let part = |v: i64, n: i64| (v % n) as f64 / (n - 1) as f64;
+            [part(x * 7 + y * 13 + k, 17), part(x * 3 + y * 5 + 2 * k, 11), part(x * x + y * k, 7), 1.0]
+        })
+    }
+
+    #[test]
+    fn agrees_with_the_reference_implementation() {
+        // flip_evaluator.evaluate(a, b, "LDR", inputsRGB=False) of NVIDIA's flip-evaluator 1.7, 32-bit.
+        let map = reference(&picture(1), &picture(4), 67.0206);
+        let mean = map.pixels.iter().map(|p| p[0]).sum::<f64>() / map.pixels.len() as f64;
+        for (found, expected) in
+            [(mean, 0.256_670_8), (map.at(0, 0)[0], 0.537_007_5), (map.at(7, 5)[0], 0.139_702_4), (map.at(15, 11)[0], 0.823_598)]
+        {
+            assert!((found - expected).abs() < 5e-6, "{found}, expected {expected}");
+        }
     }
 }

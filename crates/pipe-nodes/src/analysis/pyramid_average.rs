@@ -83,24 +83,26 @@ impl PyramidAverage {
             .constant("GEOMETRIC", geometric)
             .param("epsilon", self.epsilon)
             .add();
-        let mut finer = image;
+        // The first level finds out by itself which values are finite; it is given the image in place of counts.
+        let (mut finer, mut counts) = (image, image);
         for (k, level) in atlas.levels.iter().enumerate().skip(1) {
-            let coarser = cx.intermediate(&format!("{}.values", name(k)), Shape::image(level.size, ty.channels));
+            let mut coarser = |what: &str| cx.intermediate(&format!("{}.{what}", name(k)), Shape::image(level.size, ty.channels));
+            let (values, weights) = (coarser("values"), coarser("counts"));
             let last = k + 1 == atlas.levels.len();
             let next = if last { cx.output("pyramid") } else { cx.intermediate(&name(k), pyramid) };
             cx.pass(&name(k), shader!("analysis/pyramid_level"))
                 .entry(Entry::Each)
                 .read("finer", finer, Reach::Whole)
-                .write("coarser", coarser)
+                .read("counts", counts, Reach::Whole)
+                .write("coarser", values)
+                .write("coarser_counts", weights)
                 .write_as("picture", next, Access::Store, Some(picture))
                 .constant("GEOMETRIC", geometric)
                 .constant("FIRST", k == 1)
-                .constant("LEVEL", k as u32)
                 .param("epsilon", self.epsilon)
                 .param("origin", level.origin.map(|v| v as i32))
-                .param("whole", ty.size.map(|v| v as i32))
                 .add();
-            (finer, picture) = (coarser, next);
+            (finer, counts, picture) = (values, weights, next);
         }
     }
 

@@ -67,3 +67,20 @@ fn weights() -> [f64; 11] {
     let sum: f64 = raw.iter().sum();
     raw.map(|w| w / sum)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::flip::tests::picture;
+    use super::*;
+
+    #[test]
+    fn agrees_with_scikit_image_away_from_the_border() {
+        // skimage.metrics.structural_similarity(a, b, gaussian_weights=True, sigma=1.5,
+        // use_sample_covariance=False, data_range=1, full=True) of the red channels (scikit-image 0.26).
+        let [a, b] = [picture(1), picture(4)].map(|p| p.map(1, |c| [c[0]; 4]));
+        let map = reference(&a, &b, Border::Clamp, 1.0);
+        for (x, y, expected) in [(5, 5, 0.134_556_304_797_755_2), (10, 6, 0.180_077_524_842_624_18)] {
+            assert!((1.0 - map.at(x, y)[0] - expected).abs() < 1e-12);
+        }
+    }
+}
