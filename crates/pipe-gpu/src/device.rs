@@ -27,6 +27,7 @@ pub struct Device {
     /// Largest buffer that can be made, in bytes; a shader may be able to bind less of it.
     pub(crate) max_buffer: u64,
     description: AdapterDescription,
+    options: OpenOptions,
     trouble: Arc<Trouble>,
 }
 
@@ -82,8 +83,14 @@ impl Device {
             device,
             queue,
             info,
+            options,
             trouble,
         })
+    }
+
+    /// Opens the same adapter once more, in the same way.
+    pub(crate) fn reopen(&self) -> Result<Self, GpuError> {
+        Self::open_with(&Choice::Index(self.description.index), self.options)
     }
 
     /// What plans for this device may use.

@@ -1,4 +1,7 @@
 //! Small measurements: what `doctor` tests and what `bench` compares with.
+//!
+//! Each is a plan of one kernel, run like any other: so what is measured is what graphs get, and what is tested is the
+//! way that graphs go.
 
 use std::collections::HashMap;
 use std::sync::Arc;
@@ -7,7 +10,7 @@ use std::time::Instant;
 use pipe_graph::pass::Limits;
 use pipe_graph::types::{ImageType, Precision};
 use pipe_plan::Plan;
-use pipe_plan::plan::{Binding, Fetched, Kernel, KernelId, Launch, Run, Slot, SlotId, Step, Storage, Upload};
+use pipe_plan::plan::{Binding, Fetched, Kernel, KernelId, Launch, Repeat, Run, Slot, SlotId, Step, Storage, Times, Upload};
 
 use crate::device::Device;
 use crate::error::GpuError;
@@ -33,7 +36,7 @@ fn single(label: &str, wgsl: &str, slots: Vec<Slot>, bindings: Vec<Binding>, gro
     let ids: Vec<SlotId> = (0..slots.len()).map(|i| SlotId(i as u32)).collect();
     let bytes: u64 = slots.iter().map(|s| s.storage.bytes()).sum();
     let uploads = ids.iter().zip(&slots).filter(|(_, s)| s.uploaded);
-    let uploads = uploads.map(|(id, s)| Upload { name: "in".into(), ranges: vec![0..s.storage.bytes()], slot: *id }).collect();
+    let uploads = uploads.map(|(id, s)| Upload { name: "in".into(), ranges: std::iter::once(0..s.storage.bytes()).collect(), slot: *id }).collect();
     let fetches = ids.iter().zip(&slots).filter(|(_, s)| s.fetched);
     let fetches = fetches.map(|(id, s)| Fetched { name: "out".into(), parts: vec![(*id, 0..s.storage.bytes())] }).collect();
     Plan {
@@ -108,7 +111,7 @@ fn words(executor: &mut Executor, body: &str) -> Result<Vec<u32>, GpuError> {
 
 /// Tests what pipe relies on. The device is opened anew, so that a test that loses it harms nothing else.
 pub fn examine(device: &Device) -> Result<Vec<Finding>, GpuError> {
-    let again = Device::open(&crate::Choice::Name(device.name().to_owned()))?;
+    let again = device.reopen()?;
     let mut executor = Executor::new(again, None);
     let mut findings = Vec::new();
     let loops = words(
@@ -154,12 +157,17 @@ pub fn examine(device: &Device) -> Result<Vec<Finding>, GpuError> {
         vital: true,
         hint: "histograms would be wrong",
     });
+    let halves = half_images(&mut executor)?;
     findings.push(Finding {
         name: "half images",
-        value: if device.limits().half_storage { "of every channel count".into() } else { "of 4 channels only".into() },
-        good: device.limits().half_storage,
-        vital: false,
-        hint: "1- and 2-channel half images take the memory of float ones here",
+        value: match (halves, device.limits().half_storage) {
+            (false, _) => "do not keep what is stored".into(),
+            (true, true) => "of every channel count".into(),
+            (true, false) => "of 4 channels only".into(),
+        },
+        good: halves && device.limits().half_storage,
+        vital: !halves,
+        hint: if halves { "1- and 2-channel half images take the memory of float ones here" } else { "options: (format: F16) gives wrong results" },
     });
     findings.push(Finding {
         name: "timestamps",
@@ -170,10 +178,80 @@ pub fn examine(device: &Device) -> Result<Vec<Finding>, GpuError> {
     });
     let rate = copy_bandwidth(&mut executor, [2048, 2048])?;
     findings.push(Finding { name: "copy bandwidth", value: format!("{rate:.1} GB/s"), good: rate > 0.0, vital: false, hint: "" });
+    let launch = launch_cost(&mut executor)?;
+    findings.push(Finding { name: "launch", value: format!("{launch:.1} µs"), good: true, vital: false, hint: "" });
     let (up, down) = transfer_rates(&mut executor)?;
     findings.push(Finding { name: "upload", value: format!("{up:.1} GB/s"), good: true, vital: false, hint: "" });
     findings.push(Finding { name: "readback", value: format!("{down:.1} GB/s"), good: true, vital: false, hint: "" });
     Ok(findings)
+}
+
+/// Whether half images of every channel count that can be written keep numbers that halves can hold.
+fn half_images(executor: &mut Executor) -> Result<bool, GpuError> {
+    let formats = [(1, "r16float"), (2, "rg16float"), (4, "rgba16float")];
+    let all = executor.device().limits().half_storage;
+    for (channels, format) in formats.into_iter().filter(|(channels, _)| all || *channels == 4) {
+        let image = ImageType { size: [16, 1], channels, precision: Precision::F16 };
+        let write = format!(
+            "@group(0) @binding(0) var o: texture_storage_2d<{format}, write>;\n\
+             @compute @workgroup_size(16) fn main(@builtin(global_invocation_id) id: vec3u) {{\n\
+             textureStore(o, id.xy, vec4f(exp2(f32(id.x)) + 0.5, -f32(id.x), 65504.0, 1.0)); }}"
+        );
+        let read = "@group(0) @binding(0) var a: texture_2d<f32>;\n\
+             @group(0) @binding(1) var<storage, read_write> b: array<vec4f>;\n\
+             @compute @workgroup_size(16) fn main(@builtin(global_invocation_id) id: vec3u) { b[id.x] = textureLoad(a, id.xy, 0); }";
+        let slot = Slot { storage: Storage::Image(image), uploaded: false, fetched: false };
+        let mut plan = single("half images", &write, vec![slot], vec![Binding::StorageImage(image)], [1, 1, 1]);
+        let mut second = single("half images", read, vec![buffer(256, false, true)], vec![Binding::SampledImage, Binding::WriteBuffer], [1, 1, 1]);
+        plan.slots.append(&mut second.slots);
+        plan.kernels.append(&mut second.kernels);
+        if let Some(Step::Run(mut run)) = second.steps.pop() {
+            (run.kernel, run.slots) = (KernelId(1), vec![SlotId(0), SlotId(1)]);
+            plan.steps.push(Step::Run(run));
+        }
+        plan.fetches.push(Fetched { name: "out".into(), parts: vec![(SlotId(1), 0..256)] });
+        let prepared = executor.prepare(Arc::new(plan))?;
+        let out = executor.run(&prepared, &HashMap::new(), &RunOptions::default())?;
+        executor.release(prepared);
+        let values: Vec<f32> = out.fetched["out"].chunks_exact(4).map(|b| f32::from_le_bytes([b[0], b[1], b[2], b[3]])).collect();
+        let good = values.chunks_exact(4).enumerate().all(|(i, pixel)| {
+            // Above 1024 a half has no place for 0.5, and may round either way.
+            let exact = (i as f32).exp2() + 0.5;
+            let expected = [exact, -(i as f32), 65504.0, 1.0];
+            let tolerance = [exact / 1024.0, 0.0, 0.0, 0.0];
+            (0..channels as usize).all(|c| (pixel[c] - expected[c]).abs() <= tolerance[c])
+        });
+        if !good {
+            return Ok(false);
+        }
+    }
+    Ok(true)
+}
+
+/// Microseconds that an empty launch takes among a thousand, the median of five.
+fn launch_cost(executor: &mut Executor) -> Result<f64, GpuError> {
+    let wgsl = "@group(0) @binding(0) var<storage, read_write> o: array<u32>;\n@compute @workgroup_size(1) fn main() { o[0] += 1u; }";
+    let mut plan = single("launch", wgsl, vec![buffer(256, false, false)], vec![Binding::WriteBuffer], [1, 1, 1]);
+    let body = std::mem::take(&mut plan.steps);
+    plan.steps.push(Step::Repeat(Repeat {
+        name: "launch".to_owned(),
+        node: "launch".to_owned(),
+        first: body.clone(),
+        odd: body.clone(),
+        even: body,
+        count: Times::Fixed(1000),
+        settle: Vec::new(),
+    }));
+    let prepared = executor.prepare(Arc::new(plan))?;
+    let mut times = Vec::new();
+    for _ in 0..6 {
+        times.push(executor.run(&prepared, &HashMap::new(), &RunOptions::default())?.timings.compute_ms);
+    }
+    executor.release(prepared);
+    // The first run compiles, and learns what a launch costs.
+    times.remove(0);
+    times.sort_by(f64::total_cmp);
+    Ok(times[times.len() / 2])
 }
 
 /// GB/s to the device and back, the second of two runs.

@@ -1,5 +1,7 @@
 //! Memory over very long loops. A process of its own: what is measured is the whole process.
 
+#![allow(clippy::unwrap_used, clippy::single_range_in_vec_init, reason = "a test that panics has failed")]
+
 mod common;
 
 use common::{count_to, executor};

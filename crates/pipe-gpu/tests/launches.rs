@@ -1,5 +1,7 @@
 //! Launches: kernels, images, points, clears, uniforms, time, and mistakes in shaders.
 
+#![allow(clippy::unwrap_used, clippy::single_range_in_vec_init, reason = "a test that panics has failed")]
+
 mod common;
 
 use std::collections::HashMap;

@@ -1,5 +1,7 @@
 //! Loops: parity, loops within loops, loops that end by a value, very long ones, and ends by force.
 
+#![allow(clippy::unwrap_used, clippy::single_range_in_vec_init, reason = "a test that panics has failed")]
+
 mod common;
 
 use std::collections::HashMap;

@@ -1,5 +1,7 @@
 //! Bytes: uploads, fetches, reuse of memory, budgets, and values kept between frames.
 
+#![allow(clippy::unwrap_used, clippy::single_range_in_vec_init, reason = "a test that panics has failed")]
+
 mod common;
 
 use std::collections::HashMap;
@@ -194,7 +196,7 @@ fn values_wait_as_many_frames_as_they_should() {
     for delay in 1..=3 {
         let mut e = executor();
         let prepared = e.prepare(delayed(delay)).unwrap();
-        let mut frame = |e: &mut Executor, n: u32| {
+        let frame = |e: &mut Executor, n: u32| {
             let bytes = [n, 0, 0, 0].map(u32::to_le_bytes).concat();
             let out = e.run(&prepared, &HashMap::from([("in", bytes.as_slice())]), &RunOptions::default()).unwrap();
             // Both kernels add 1; what is not there yet is zero.
