@@ -1,0 +1,39 @@
+# Two commands do everything: `make demo` and `make test`. Both install what a fresh Debian or Ubuntu lacks.
+
+CARGO ?= cargo
+IMAGE := tests/data/workshop.exr
+
+.PHONY: demo test build setup fmt clippy generated goldens
+
+# The main job on a real photograph: tone mapping. Prints the plan and where the picture is.
+demo: setup
+	$(CARGO) build --release --locked --package pipe
+	@mkdir -p out
+	./target/release/pipe plan tone-map --size 512x256
+	./target/release/pipe run tone-map $(IMAGE) out/demo.png -v
+	@echo "The picture is out/demo.png"
+
+# Every test, on whatever adapter there is; none is skipped for want of one.
+test: setup
+	@bash tests/run.sh
+
+build:
+	$(CARGO) build --release --locked --package pipe
+
+# A Vulkan driver, when there is none: Mesa's software renderer.
+setup:
+	@bash tests/setup.sh
+
+fmt:
+	$(CARGO) fmt --all
+
+clippy:
+	$(CARGO) clippy --workspace --all-targets --locked -- --deny warnings
+
+# Writes the generated pages anew.
+generated: build
+	./target/release/pipe nodes --markdown > docs/nodes.md
+
+# Writes the expected pictures of the presets anew. Look at each before it is committed.
+goldens: build
+	./target/release/pipe test --bless tests/golden
