@@ -3,8 +3,14 @@
 //!
 //! `cargo test -p pipe-tests --test nodes -- Blur` runs those whose name contains `Blur`.
 
-use pipe_graph::node::Kind;
+use std::collections::HashMap;
+
+use pipe_graph::graph::Graph;
+use pipe_graph::node::{Category, Kind};
+use pipe_graph::pass::{Item, Limits, Origin, Reach, ResourceId, Shape};
+use pipe_graph::reference::{Raster, Tensor};
 use pipe_graph::types::EdgeType;
+use pipe_plan::lower::{Rim, lower};
 use pipe_tests::bench::{Bench, compile, reference};
 use pipe_tests::source::{edge, edge_type};
 
@@ -16,7 +22,8 @@ fn main() {
     let filter: Vec<String> = std::env::args().skip(1).filter(|a| !a.starts_with('-')).collect();
     let mut bench = Bench::new();
     let (mut passed, mut failed) = (0, Vec::new());
-    for kind in pipe_nodes::REGISTRY.iter() {
+    // What shapes the graph and becomes no pass is tested by `structure.rs`.
+    for kind in pipe_nodes::REGISTRY.iter().filter(|k| k.category != Category::Structure || !k.ports.is_empty() || k.name == "Readback") {
         for (number, example) in kind.examples.iter().enumerate() {
             let name = format!("{}::example_{number}", kind.name);
             if !filter.is_empty() && !filter.iter().any(|f| name.contains(f.as_str())) {
@@ -71,7 +78,64 @@ fn every_variant(bench: &mut Bench, kind: &Kind, example: &str) -> Result<(), St
     for border in BORDERS {
         one(bench, kind, example, [61, 47], &format!("border: {border}"))?;
     }
+    reach_is_true(bench, kind, example)
+}
+
+/// Pixels of the inputs outside the declared reach are changed: the pixel in the middle must stay, to the bit.
+fn reach_is_true(bench: &mut Bench, kind: &Kind, example: &str) -> Result<(), String> {
+    let size = [61, 47];
+    let types: Vec<(&str, EdgeType)> = named(example).map(|n| (n, edge_type(n, size))).collect();
+    let ports: Vec<String> = kind.ports.iter().map(|p| p.0.to_owned()).collect();
+    let graph = compile(&graph_text(kind, example, "", &ports), &types)?;
+    let Some([rx, ry]) = declared_reach(&graph, &bench.limits()) else { return Ok(()) };
+    let (cx, cy) = (30_i64, 23_i64);
+    let near = |x: i64, y: i64| (x - cx).abs() <= i64::from(rx) && (y - cy).abs() <= i64::from(ry);
+    let same = |name: &str| edge(name, size);
+    let changed = |name: &str| match edge(name, size) {
+        Tensor::Image(r) => Tensor::Image(Raster::from_fn(r.size, r.channels, |x, y| if near(x, y) { r.at(x, y) } else { [0.875, 3.5, -0.25, 0.5] })),
+        other => other,
+    };
+    let (a, b) = (bench.gpu(&graph, &same)?, bench.gpu(&graph, &changed)?);
+    for (name, value) in graph.outputs() {
+        let EdgeType::Image(t) = graph.ty(value) else { continue };
+        if t.size != size {
+            continue;
+        }
+        let at = (cy as usize * 61 + cx as usize) * t.channels as usize;
+        let pixel = |v: &pipe_tests::bench::Values| v[name][at..at + t.channels as usize].to_vec();
+        if pixel(&a) != pixel(&b) {
+            return Err(format!("its reach is declared as ({rx}, {ry}), but a pixel further away changes `{name}`: {:?} and {:?}", pixel(&a), pixel(&b)));
+        }
+    }
     Ok(())
+}
+
+/// How far the outputs look into the image inputs, by what the passes declare; `None` when it is anywhere.
+fn declared_reach(graph: &Graph, limits: &Limits) -> Option<[u32; 2]> {
+    let passes = lower(graph, &Rim::default(), limits).ok()?;
+    let mut reach: HashMap<ResourceId, [u32; 2]> = HashMap::new();
+    let mut most = [0, 0];
+    for item in &passes.items {
+        let Item::Pass(pass) = item else { return None };
+        let mut own = [0, 0];
+        for read in &pass.reads {
+            let words = matches!(passes.resource(read.resource).shape, Shape::Words { .. });
+            let known = matches!(passes.resource(read.resource).origin, Origin::Literal(_));
+            let far = match read.reach {
+                _ if words || known => [0, 0],
+                Reach::Point => [0, 0],
+                Reach::Around(x, y) => [x, y],
+                Reach::Whole => return None,
+            };
+            let before = reach.get(&read.resource).copied().unwrap_or_default();
+            own = [own[0].max(before[0] + far[0]), own[1].max(before[1] + far[1])];
+        }
+        for write in &pass.writes {
+            reach.insert(write.resource, own);
+        }
+        most = [most[0].max(own[0]), most[1].max(own[1])];
+    }
+    (most[0] < 30 && most[1] < 23).then_some(most)
 }
 
 fn one(bench: &mut Bench, kind: &Kind, example: &str, size: [u32; 2], options: &str) -> Result<(), String> {

@@ -1,0 +1,97 @@
+//! Every preset that takes one image, from file to file, against its twin in double precision and against a picture that
+//! the twin made earlier.
+//!
+//! `PIPE_BLESS=1 cargo test -p pipe-tests --test presets` writes the pictures anew, from the twin, never from the GPU.
+
+use std::path::PathBuf;
+
+use pipe::presets;
+use pipe::project::{Project, World};
+use pipe::run::{Job, Session};
+use pipe_graph::reference::{Raster, Tensor, evaluate};
+use pipe_graph::resolve::Request;
+use pipe_graph::types::{EdgeKind, EdgeType};
+use pipe_io::{Picture, ReadOptions, Source};
+
+const INPUT: &str = "data/workshop-small.exr";
+
+/// Code values by which the 8-bit picture may be off: rounding, and powers that devices compute to six digits.
+const ALLOWED: i32 = 1;
+
+fn path(relative: &str) -> String {
+    PathBuf::from(env!("CARGO_MANIFEST_DIR")).join(relative).display().to_string()
+}
+
+fn read(file: &str) -> Picture {
+    pipe_io::read(&Source::parse(file), &ReadOptions::default()).unwrap_or_else(|e| panic!("{e}"))
+}
+
+fn raster(p: &Picture) -> Raster {
+    let n = p.channels.count();
+    Raster::from_fn([p.width, p.height], if n == 1 { 1 } else { 4 }, |x, y| {
+        let at = |c: usize| f64::from(p.sample_at(x as u32, y as u32, c.min(n - 1)).expect("inside"));
+        [at(0), at(1), at(2), 1.0]
+    })
+}
+
+/// 8-bit sRGB, rounded to nearest.
+fn encode(v: f64) -> i32 {
+    let v = v.clamp(0.0, 1.0);
+    let e = if v <= 0.003_130_8 { 12.92 * v } else { 1.055 * v.powf(1.0 / 2.4) - 0.055 };
+    (e * 255.0 + 0.5).floor() as i32
+}
+
+fn bytes(p: &Picture) -> Vec<i32> {
+    p.bytes.iter().map(|b| i32::from(*b)).collect()
+}
+
+#[test]
+fn presets_agree_with_their_twins_and_goldens() {
+    let choice = pipe_gpu::Choice::parse(&std::env::var("PIPE_DEVICE").unwrap_or_default());
+    let mut session = Session::open(&choice, None).unwrap_or_else(|e| panic!("{e}"));
+    let input = path(INPUT);
+    let picture = raster(&read(&input));
+    let folder = tempfile::tempdir().expect("a folder");
+    let bless = std::env::var_os("PIPE_BLESS").is_some();
+    let (mut seen, mut wrong) = (0, Vec::new());
+    for name in presets::names() {
+        let mut project = Project::open(name).unwrap_or_else(|e| panic!("{e}"));
+        let document = project.document.clone().expect("presets parse");
+        let takes_one_image = document.inputs.len() == 1 && document.inputs[0].kind == EdgeKind::Image;
+        if !takes_one_image || document.outputs.len() != 1 {
+            continue;
+        }
+        seen += 1;
+        let request = Request { inputs: [(document.inputs[0].name.value.clone(), EdgeType::image(picture.size, 4))].into(), frame: 1.0, ..Request::default() };
+        let graph = project.resolve(&request, &World::default()).unwrap_or_else(|| panic!("{}", project.render(false)));
+        let twin = evaluate(&graph, &|_| Tensor::Image(picture.clone()));
+        let (_, value) = graph.outputs().next().expect("it has one output");
+        let Some(Tensor::Image(twin)) = twin.get(&value) else { panic!("{name} makes no image") };
+
+        let out = folder.path().join(format!("{name}.png")).display().to_string();
+        let mut job = Job::new(name);
+        job.bind_input(&document.inputs[0].name.value, &input);
+        job.bind_output(&document.outputs[0].0.value, &out).expect("a png");
+        session.run(&job).unwrap_or_else(|e| panic!("{name}: {e}"));
+        let got = read(&out);
+        let channels = got.channels.count();
+        let expected: Vec<i32> = twin.pixels.iter().flat_map(|p| (0..channels).map(|c| if c == 3 { (p[3].clamp(0.0, 1.0) * 255.0 + 0.5) as i32 } else { encode(p[c]) })).collect();
+        let golden = path(&format!("golden/{name}.png"));
+        if bless {
+            let bytes = expected.iter().map(|v| *v as u8).collect();
+            let target = pipe_io::Target::parse(&golden).expect("a png");
+            let options = pipe_io::WriteOptions { channels: Some(got.channels), compression: Some(pipe_io::Compression::Best), ..Default::default() };
+            pipe_io::write(&target, &Picture { bytes, ..got.clone() }, &options).unwrap_or_else(|e| panic!("{e}"));
+        }
+        for (what, other) in [("its twin", &expected), ("its golden", &bytes(&read(&golden)))] {
+            let off = bytes(&got).iter().zip(other).map(|(a, b)| (a - b).abs()).max().unwrap_or(i32::MAX);
+            let count = bytes(&got).iter().zip(other).filter(|(a, b)| (*a - *b).abs() > ALLOWED).count();
+            // A value on the edge of a level may fall to either side; a few in a thousand may.
+            if bytes(&got).len() != other.len() || count * 500 > other.len() {
+                wrong.push(format!("{name} is off {what} by up to {off}, more than {ALLOWED} at {count} of {} samples", other.len()));
+            }
+        }
+    }
+    assert!(seen >= 10, "only {seen} presets were tested");
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+}
