@@ -6,6 +6,7 @@
 //! ∂u/∂n = −(1/c)·∂u/∂t, that is a ghost of u − (dx/c)·v. Put into ∇² this is a `Neumann` edge whose pixels are
 //! damped by c/dx more for each open side: linear, local, and right for every integrator.
 
+use pipe_graph::lowering::PassBuilder;
 use pipe_graph::prelude::*;
 
 /// What lies outside the grid.
@@ -54,22 +55,34 @@ impl Medium {
         if self.boundary == Boundary::Absorbing { f64::from(self.c2).sqrt() / f64::from(self.dx) } else { 0.0 }
     }
 
-    /// A shader of this section behind the ∇² that they share, with its parameters. It reads `state`.
+    /// A pass of a shader of this section that reads `state`, with the parameters that they share.
+    pub(super) fn bare_pass<'b, 'a>(
+        &self,
+        cx: &'b mut Lowering<'a>,
+        suffix: &str,
+        shader: Shader,
+        reach: Reach,
+        state: ResourceId,
+    ) -> PassBuilder<'b, 'a> {
+        cx.pass(suffix, shader)
+            .read_with("state", state, reach, self.boundary.border(), Filter::Nearest)
+            .constant("ABSORBING", self.boundary == Boundary::Absorbing)
+            .param("dt", self.dt)
+            .param("stiffness", self.stiffness() as f32)
+            .param("damping", self.damping)
+            .param("opening", self.opening() as f32)
+    }
+
+    /// The same of a shader that stands behind the ∇² of `stencil.wgsl`.
     pub(super) fn pass<'b, 'a>(
         &self,
         cx: &'b mut Lowering<'a>,
         suffix: &str,
         shader: &Shader,
         state: ResourceId,
-    ) -> pipe_graph::lowering::PassBuilder<'b, 'a> {
+    ) -> PassBuilder<'b, 'a> {
         let stencil = crate::shader!("simulation/stencil");
         let text = format!("{}\n{}", stencil.source, shader.source);
-        cx.pass(suffix, Shader::builtin(&shader.path, &text))
-            .read_with("state", state, Reach::Around(1, 1), self.boundary.border(), Filter::Nearest)
-            .constant("ABSORBING", self.boundary == Boundary::Absorbing)
-            .param("dt", self.dt)
-            .param("stiffness", self.stiffness() as f32)
-            .param("damping", self.damping)
-            .param("opening", self.opening() as f32)
+        self.bare_pass(cx, suffix, Shader::builtin(&shader.path, &text), Reach::Around(1, 1), state)
     }
 }

@@ -98,6 +98,17 @@ pub(crate) const KIND: Kind = Kind::of::<WaveEquation>(
 // Relative to the largest velocities: rounding of u is multiplied by c²·dt/dx² in each step.
 .tolerance(1e-3, 1e-4);
 
+/// Steps that a GPU takes in one pass where it can: each costs a ring of the 64×64 pixels that a workgroup holds, and
+/// spares a round trip of the state through memory.
+const BLOCK: u32 = 6;
+
+impl Integrator {
+    /// Whether a step needs ∇² of one field only, so that workgroup memory holds a large square of it.
+    const fn needs_one_field(self) -> bool {
+        matches!(self, Self::Euler | Self::SymplecticEuler | Self::Verlet)
+    }
+}
+
 impl WaveEquation {
     const fn medium(&self) -> Medium {
         Medium { dt: self.dt, dx: self.dx, c2: self.c2, damping: self.damping, boundary: self.boundary }
@@ -116,37 +127,69 @@ impl WaveEquation {
         Solver::new(theta, &self.medium(), size, f64::from(self.tolerance))
     }
 
-    fn explicit(&self, cx: &mut Lowering<'_>, state: ResourceId) -> Result<ResourceId, Mistake> {
-        let medium = self.medium();
-        let shape = cx.shape(state);
-        let result = cx.repeat("", Count::Fixed(self.steps), &[state], |cx, states| {
-            let next = cx.intermediate("next", shape);
-            medium
-                .pass(cx, "step", &shader!("simulation/wave_explicit"), states[0])
+    /// `count` steps from `state`, as many as possible of them in blocks.
+    fn stepped(&self, cx: &mut Lowering<'_>, count: u32, state: ResourceId) -> Result<ResourceId, Mistake> {
+        let block = if cx.limits().profile == Profile::Gpu && self.integrator.needs_one_field() { BLOCK } else { 1 };
+        let mut state = state;
+        for (size, times) in [(block, count / block), (1, count % block)] {
+            if times > 0 {
+                let suffix = if size == 1 { "step" } else { "steps" };
+                state = cx.repeat(suffix, Count::Fixed(times), &[state], |cx, states| {
+                    let next = cx.intermediate("next", cx.shape(states[0]));
+                    if size == 1 { self.single(cx, states[0], next) } else { self.block(cx, states[0], next) }
+                    Ok(vec![next])
+                })?[0];
+            }
+        }
+        Ok(state)
+    }
+
+    /// One step in one pass.
+    fn single(&self, cx: &mut Lowering<'_>, state: ResourceId, next: ResourceId) {
+        if self.integrator == Integrator::Verlet {
+            self.verlet_stage(cx, "step", 1, state, next);
+        } else {
+            self.medium()
+                .pass(cx, "step", &shader!("simulation/wave_explicit"), state)
                 .write("out", next)
                 .constant("METHOD", self.integrator as i32)
                 .add();
-            Ok(vec![next])
-        })?;
-        Ok(result[0])
+        }
+    }
+
+    /// [`BLOCK`] steps in one pass.
+    fn block(&self, cx: &mut Lowering<'_>, state: ResourceId, next: ResourceId) {
+        let core = 64 - 2 * BLOCK;
+        let [w, h] = cx.image_of(state).size;
+        let medium = self.medium();
+        medium
+            .bare_pass(cx, "steps", shader!("simulation/wave_blocked"), Reach::Around(BLOCK, BLOCK), state)
+            .entry(Entry::Kernel)
+            .grid(Grid::Groups([w.div_ceil(core), h.div_ceil(core), 1]))
+            .write("out", next)
+            .constant("METHOD", self.integrator as i32)
+            .constant("STEPS", BLOCK as i32)
+            .constant("FIXED", medium.boundary == Boundary::Dirichlet)
+            .constant("PERIODIC", medium.boundary == Boundary::Periodic)
+            .add();
     }
 
     fn verlet(&self, cx: &mut Lowering<'_>, state: ResourceId) -> Result<ResourceId, Mistake> {
-        let medium = self.medium();
         let shape = cx.shape(state);
-        let stage = |cx: &mut Lowering<'_>, suffix: &str, stage: i32, from: ResourceId| {
-            let next = cx.intermediate(suffix, shape);
-            let shader = shader!("simulation/wave_verlet");
-            medium.pass(cx, suffix, &shader, from).write("out", next).constant("STAGE", stage).add();
-            next
-        };
-        let ahead = stage(cx, "start", 0, state);
-        let almost = if self.steps > 1 {
-            cx.repeat("", Count::Fixed(self.steps - 1), &[ahead], |cx, states| Ok(vec![stage(cx, "step", 1, states[0])]))?[0]
-        } else {
-            ahead
-        };
-        Ok(stage(cx, "end", 2, almost))
+        let ahead = cx.intermediate("start", shape);
+        self.verlet_stage(cx, "start", 0, state, ahead);
+        let almost = self.stepped(cx, self.steps - 1, ahead)?;
+        let end = cx.intermediate("end", shape);
+        self.verlet_stage(cx, "end", 2, almost, end);
+        Ok(end)
+    }
+
+    fn verlet_stage(&self, cx: &mut Lowering<'_>, suffix: &str, stage: i32, state: ResourceId, next: ResourceId) {
+        self.medium()
+            .pass(cx, suffix, &shader!("simulation/wave_verlet"), state)
+            .write("out", next)
+            .constant("STAGE", stage)
+            .add();
     }
 
     fn implicit(&self, cx: &mut Lowering<'_>, theta: f64, state: ResourceId) -> Result<ResourceId, Mistake> {
@@ -226,7 +269,7 @@ impl Node for WaveEquation {
             (0, ..) => state,
             (_, Integrator::Verlet, _) => self.verlet(cx, state)?,
             (_, _, Some(theta)) => self.implicit(cx, theta, state)?,
-            _ => self.explicit(cx, state)?,
+            _ => self.stepped(cx, self.steps, state)?,
         };
         cx.emit("out", end);
         let out = cx.output("energy");
