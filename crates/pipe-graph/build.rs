@@ -4,6 +4,7 @@ use std::fmt::Write as _;
 use std::path::PathBuf;
 use std::{env, fs};
 
+#[allow(clippy::unnecessary_debug_formatting)] // A quoted path is what the generated source needs.
 fn main() {
     let folder = PathBuf::from(env::var("CARGO_MANIFEST_DIR").expect("cargo sets it")).join("../../shaders/lib");
     println!("cargo::rerun-if-changed={}", folder.display());

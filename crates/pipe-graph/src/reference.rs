@@ -80,6 +80,7 @@ impl Raster {
     }
 
     /// Every pixel through `f`.
+    #[must_use]
     pub fn map(&self, channels: u8, mut f: impl FnMut([f64; 4]) -> [f64; 4]) -> Self {
         let pixels = self.pixels.iter().map(|p| narrow(f(*p), channels)).collect();
         Self { size: self.size, channels, pixels }

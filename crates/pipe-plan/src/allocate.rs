@@ -275,9 +275,9 @@ impl Player<'_> {
         for write in &pass.writes {
             if let Some(old) = write.in_place_of {
                 names.insert(write.resource, names[&old]);
-            } else if !names.contains_key(&write.resource) {
+            } else if let std::collections::btree_map::Entry::Vacant(e) = names.entry(write.resource) {
                 let value = self.begin(write.resource, self.time);
-                names.insert(write.resource, value);
+                e.insert(value);
             }
             if write.in_place_of.is_none() && write.access != Access::Store {
                 clears.push(names[&write.resource]);

@@ -56,11 +56,10 @@ pub fn lower(graph: &Graph, rim: &Rim, limits: &Limits) -> Result<PassGraph, Pla
         items.extend(lowerer.fetch(&name, values[&value], graph.ty(value)));
     }
     for (_, instance) in graph.iter() {
-        if let Work::Feedback { next, .. } = instance.work {
-            if let Carried::One(id) = values[&next] {
+        if let Work::Feedback { next, .. } = instance.work
+            && let Carried::One(id) = values[&next] {
                 lowerer.passes.kept.push((instance.name.clone(), id));
             }
-        }
     }
     lowerer.passes.items = std::mem::take(&mut lowerer.decoding);
     lowerer.passes.items.extend(items);

@@ -274,7 +274,7 @@ impl Session {
     ) -> Result<Finished, Failure> {
         let started = Instant::now();
         let mut project = Project::open(&job.graph)?;
-        let world = World { read: job.read.clone() };
+        let world = World { read: job.read };
         let request = request(job, inputs);
         let Some(graph) = project.resolve(&request, &world) else { return Err(project.failure(false)) };
         let files = read_files(&graph, job)?;
@@ -488,13 +488,13 @@ fn readbacks(graph: &Graph) -> Vec<(String, ReadbackFile)> {
 
 fn first_size(graph: &Graph) -> Vec<u32> {
     let outputs = graph.outputs().map(|(_, v)| graph.ty(v));
-    let all = graph.inputs().map(|(_, t)| t).chain(outputs);
+    let mut all = graph.inputs().map(|(_, t)| t).chain(outputs);
     let size = |t: EdgeType| match t {
         EdgeType::Image(t) => Some(t.size.to_vec()),
         EdgeType::Volume(t) => Some(t.size.to_vec()),
         _ => None,
     };
-    all.filter_map(size).next().unwrap_or_default()
+    all.find_map(size).unwrap_or_default()
 }
 
 /// Lowers and plans.

@@ -3,7 +3,7 @@
 use pipe_graph::prelude::*;
 use smart_default::SmartDefault;
 
-use crate::filters::gaussian::{separable, separable_reference};
+use crate::filters::gaussian::{blur, separable_reference};
 use crate::shader;
 
 /// Adds a blur of what is brighter than a threshold: in + intensity·blur(max(in − threshold, 0)). Alpha is kept.
@@ -46,7 +46,7 @@ impl Node for Bloom {
             .write("out", bright)
             .param("threshold", self.threshold)
             .add();
-        separable(cx, "blur.", [self.sigma; 2], bright, blurred);
+        blur(cx, "blur.", [self.sigma; 2], bright, blurred);
         cx.pass("", shader!("filters/bloom"))
             .entry(Entry::Point)
             .read("image", image, Reach::Point)

@@ -2,6 +2,7 @@
 
 use pipe_graph::prelude::*;
 
+use crate::filters::recursive::recursive;
 use crate::shader;
 
 /// The radius beyond which the Gaussian is cut: ceil(3σ).
@@ -62,6 +63,18 @@ pub(super) fn separable(cx: &mut Lowering<'_>, prefix: &str, sigma: [f32; 2], im
     let rows = cx.intermediate(&format!("{prefix}rows"), shape);
     convolve(cx, &format!("{prefix}rows"), Axis::X, &wx, image, rows);
     convolve(cx, &format!("{prefix}columns"), Axis::Y, &wy, rows, out);
+}
+
+/// The radius up to which two convolutions are faster than the recursive filter, whose cost does not depend on σ.
+const SEPARABLE_UP_TO: u32 = 24;
+
+/// The fastest Gaussian blur of `image` into `out`: exact while σ is small, recursive beyond.
+pub(super) fn blur(cx: &mut Lowering<'_>, prefix: &str, sigma: [f32; 2], image: ResourceId, out: ResourceId) {
+    if sigma.iter().all(|s| radius(*s) <= SEPARABLE_UP_TO) {
+        separable(cx, prefix, sigma, image, out);
+    } else {
+        recursive(cx, prefix, sigma, image, out);
+    }
 }
 
 /// The twin of a one-dimensional convolution.

@@ -7,6 +7,7 @@ mod convolve;
 mod gaussian;
 mod gaussian_blur;
 mod importance;
+mod recursive;
 mod sobel;
 mod unsharp_mask;
 

@@ -3,7 +3,7 @@
 use pipe_graph::prelude::*;
 use smart_default::SmartDefault;
 
-use crate::filters::gaussian::{separable, separable_reference};
+use crate::filters::gaussian::{blur, separable_reference};
 use crate::shader;
 
 /// Sharpens: in + amount·(in − blur), where |in − blur| > threshold. Per channel, alpha kept.
@@ -40,7 +40,7 @@ impl Node for UnsharpMask {
         let (image, out) = (cx.input(&self.image), cx.output("out"));
         let shape = cx.shape(out);
         let blurred = cx.intermediate("blurred", shape);
-        separable(cx, "blur.", [self.sigma; 2], image, blurred);
+        blur(cx, "blur.", [self.sigma; 2], image, blurred);
         cx.pass("", shader!("filters/unsharp_mask"))
             .entry(Entry::Point)
             .read("image", image, Reach::Point)

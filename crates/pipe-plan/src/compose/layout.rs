@@ -128,7 +128,8 @@ fn body_of_main(text: &str) -> Option<usize> {
         from = at + 1;
     };
     let mut depth = 0;
-    let open = text[main..].char_indices().find_map(|(i, c)| {
+    
+    text[main..].char_indices().find_map(|(i, c)| {
         match c {
             '(' => depth += 1,
             ')' => depth -= 1,
@@ -136,8 +137,7 @@ fn body_of_main(text: &str) -> Option<usize> {
             _ => {}
         }
         None
-    });
-    open
+    })
 }
 
 pub(super) fn constant(name: &str, value: Constant) -> String {

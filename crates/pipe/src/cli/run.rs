@@ -165,7 +165,7 @@ fn check_early(project: &mut Project, job: &Job) -> Result<(), Failure> {
         }
     }
     let request = pipe_graph::resolve::Request { settings: job.settings.clone(), frame: job.frame, ..Default::default() };
-    let world = pipe::project::World { read: job.read.clone() };
+    let world = pipe::project::World { read: job.read };
     // Sizes are unknown here, so only what is wrong at any size may end the run; sizes are checked with the pixels.
     if job.inputs.is_empty() || project.diagnostics.has_errors() {
         project.resolve(&request, &world);

@@ -1,0 +1,22 @@
+// From left to right (or down): two complex one-pole filters, Σ over n ≥ 0 of h(n)·in(x − n).
+
+fn each(xy: vec2i) {
+    let step = select(vec2i(0, 1), vec2i(1, 0), ALONG_X);
+    let start = select(vec2i(xy.x, xy.y * RUN), vec2i(xy.x * RUN, xy.y), ALONG_X);
+    var a_re = vec4f();
+    var a_im = vec4f();
+    var b_re = vec4f();
+    var b_im = vec4f();
+    for (var i = -WARM; i < RUN; i++) {
+        let v = load_image(start + step * i);
+        let a = params.pole0.x * a_re - params.pole0.y * a_im + params.gain0.x * v;
+        a_im = params.pole0.x * a_im + params.pole0.y * a_re + params.gain0.y * v;
+        a_re = a;
+        let b = params.pole1.x * b_re - params.pole1.y * b_im + params.gain1.x * v;
+        b_im = params.pole1.x * b_im + params.pole1.y * b_re + params.gain1.y * v;
+        b_re = b;
+        if i >= 0 {
+            store_out(start + step * i, a_re + b_re);
+        }
+    }
+}
