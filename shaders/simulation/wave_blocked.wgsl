@@ -1,55 +1,6 @@
-// STEPS time steps in one pass. A workgroup loads a square of 64×64 pixels, steps it in registers, and stores the middle:
-// in each step the outermost ring goes stale, for its neighbours are not there. A thread holds 16 rows of one column as
-// four quads, so neighbours above and below are its own; those to the sides, and at the ends of the 16 rows, pass
-// through workgroup memory.
-// METHOD 0: Euler; 1: symplectic Euler; 4: Verlet between half steps (see wave_verlet.wgsl).
-
-const SIDE: i32 = 64;
-
-// Quad q of column x stands at q·64 + x.
-var<workgroup> field: array<vec4f, 1024>;
-
-struct Quad {
-    u: vec4f,
-    v: vec4f,
-}
-
-/// What the edge pixel sees beyond the edge.
-fn ghost(edge: vec4f) -> vec4f {
-    return select(edge, vec4f(0.0), FIXED);
-}
-
-/// c²∇² of the field at quad q of column x, which lies at `at` in the image.
-fn bend(q: i32, x: i32, at: vec2i) -> vec4f {
-    let here = field[q * SIDE + x];
-    let above = field[max(q - 1, 0) * SIDE + x].w;
-    let below = field[min(q + 1, 15) * SIDE + x].x;
-    var left = field[q * SIDE + max(x - 1, 0)];
-    var right = field[q * SIDE + min(x + 1, SIDE - 1)];
-    var up = vec4f(above, here.xyz);
-    var down = vec4f(here.yzw, below);
-    if !PERIODIC {
-        let last = size_state() - 1;
-        let rows = vec4i(at.y) + vec4i(0, 1, 2, 3);
-        let beyond = ghost(here);
-        left = select(left, beyond, at.x == 0);
-        right = select(right, beyond, at.x == last.x);
-        up = select(up, beyond, rows == vec4i(0));
-        down = select(down, beyond, rows == vec4i(last.y));
-    }
-    return params.stiffness * (((left - here) + (right - here)) + ((up - here) + (down - here)));
-}
-
-fn resistance(at: vec2i) -> vec4f {
-    if !ABSORBING {
-        return vec4f(params.damping);
-    }
-    let last = size_state() - 1;
-    let rows = vec4i(at.y) + vec4i(0, 1, 2, 3);
-    let across = select(0.0, 1.0, at.x == 0) + select(0.0, 1.0, at.x == last.x);
-    let down = select(vec4f(0.0), vec4f(1.0), rows == vec4i(0)) + select(vec4f(0.0), vec4f(1.0), rows == vec4i(last.y));
-    return params.damping + params.opening * (across + down);
-}
+// STEPS time steps of an explicit integrator in one pass: see blocked.wgsl. METHOD is the position in the enum of
+// wave_equation.rs: 0 Euler, 1 symplectic Euler, 2 and 3 midpoint and Runge-Kutta, 4 Verlet between half steps (see
+// wave_verlet.wgsl).
 
 fn drift(s: Quad) -> Quad {
     if METHOD == 4 {
@@ -58,37 +9,30 @@ fn drift(s: Quad) -> Quad {
     return s;
 }
 
-fn kick(s: Quad, q: i32, x: i32, at: vec2i) -> Quad {
+/// The next state from the state, c²∇²u and, where the method needs it, c²∇²v.
+fn kick(s: Quad, l: vec4f, lv: vec4f, at: vec2i) -> Quad {
     let h = params.dt;
     let g = resistance(at);
-    let pull = bend(q, x, at);
+    let a = l - g * s.v;
     switch METHOD {
         case 0: {
-            return Quad(s.u + h * s.v, s.v + h * (pull - g * s.v));
+            return Quad(s.u + h * s.v, s.v + h * a);
         }
         case 1: {
-            let v = s.v + h * (pull - g * s.v);
+            let v = s.v + h * a;
             return Quad(s.u + h * v, v);
         }
-        default: {
-            let v = (s.v + 0.5 * h * pull) / (1.0 + 0.5 * h * g);
-            return Quad(s.u, v + 0.5 * h * (pull - g * v));
+        case 2: {
+            let middle = s.v + 0.5 * h * a;
+            return Quad(s.u + h * middle, s.v + h * (l + 0.5 * h * lv - g * middle));
         }
-    }
-}
-
-fn load_quad(at: vec2i) -> Quad {
-    let a = load_state(at);
-    let b = load_state(at + vec2i(0, 1));
-    let c = load_state(at + vec2i(0, 2));
-    let d = load_state(at + vec2i(0, 3));
-    return Quad(vec4f(a.x, b.x, c.x, d.x), vec4f(a.y, b.y, c.y, d.y));
-}
-
-fn store_quad(s: Quad, y: i32, at: vec2i) {
-    for (var i = 0; i < 4; i++) {
-        if y + i >= STEPS && y + i < SIDE - STEPS {
-            store_out(at + vec2i(0, i), vec4f(s.u[i], s.v[i], 0.0, 1.0));
+        case 3: {
+            let end = s.v + h * a;
+            return Quad(s.u + 0.5 * h * (s.v + end), s.v + 0.5 * h * (a + (l + h * lv - g * end)));
+        }
+        default: {
+            let v = (s.v + 0.5 * h * l) / (1.0 + 0.5 * h * g);
+            return Quad(s.u, v + 0.5 * h * (l - g * v));
         }
     }
 }
@@ -108,16 +52,28 @@ fn main(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) la
         b = drift(b);
         c = drift(c);
         d = drift(d);
-        field[q * SIDE + x] = a.u;
-        field[(q + 1) * SIDE + x] = b.u;
-        field[(q + 2) * SIDE + x] = c.u;
-        field[(q + 3) * SIDE + x] = d.u;
+        publish(q, x, a.u, b.u, c.u, d.u);
+        let la = bend(q, x, at);
+        let lb = bend(q + 1, x, at + down);
+        let lc = bend(q + 2, x, at + 2 * down);
+        let ld = bend(q + 3, x, at + 3 * down);
         workgroupBarrier();
-        a = kick(a, q, x, at);
-        b = kick(b, q + 1, x, at + down);
-        c = kick(c, q + 2, x, at + 2 * down);
-        d = kick(d, q + 3, x, at + 3 * down);
-        workgroupBarrier();
+        var va = vec4f(0.0);
+        var vb = vec4f(0.0);
+        var vc = vec4f(0.0);
+        var vd = vec4f(0.0);
+        if METHOD == 2 || METHOD == 3 {
+            publish(q, x, a.v, b.v, c.v, d.v);
+            va = bend(q, x, at);
+            vb = bend(q + 1, x, at + down);
+            vc = bend(q + 2, x, at + 2 * down);
+            vd = bend(q + 3, x, at + 3 * down);
+            workgroupBarrier();
+        }
+        a = kick(a, la, va, at);
+        b = kick(b, lb, vb, at + down);
+        c = kick(c, lc, vc, at + 2 * down);
+        d = kick(d, ld, vd, at + 3 * down);
     }
     if x >= STEPS && x < SIDE - STEPS {
         store_quad(a, q * 4, at);

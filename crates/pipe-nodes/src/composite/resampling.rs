@@ -193,14 +193,15 @@ pub(super) fn lower(cx: &mut Lowering<'_>, image: ResourceId, kernel: Kernel, ax
     current
 }
 
-/// The axis first that leaves less to do for the other.
+/// The axis first that leaves less to do for the other; y when both do, since neighbouring threads then read
+/// neighbouring pixels of the large image.
 fn in_best_order(kernel: Kernel, axes: &[Axis; 2]) -> [usize; 2] {
     let taps = |a: &Axis| 2.0 * kernel.radius() * a.stretch();
     let [x, y] = axes;
     let end = f64::from(x.output) * f64::from(y.output);
     let x_first = f64::from(x.output) * f64::from(y.input) * taps(x) + end * taps(y);
     let y_first = f64::from(x.input) * f64::from(y.output) * taps(y) + end * taps(x);
-    if y_first < x_first { [1, 0] } else { [0, 1] }
+    if y_first <= x_first { [1, 0] } else { [0, 1] }
 }
 
 /// The twin: one axis after the other.

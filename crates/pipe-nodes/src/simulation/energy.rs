@@ -9,7 +9,7 @@ use super::wave::{Boundary, Medium};
 use crate::shader;
 
 /// Entries that one thread adds.
-const CHUNK: u32 = 512;
+const CHUNK: u32 = 64;
 
 /// Declares the passes that leave the energy of a state in `out`.
 pub(super) fn lower(cx: &mut Lowering<'_>, medium: &Medium, state: ResourceId, out: ResourceId) {

@@ -9,6 +9,8 @@
 use pipe_graph::lowering::PassBuilder;
 use pipe_graph::prelude::*;
 
+use crate::shader;
+
 /// What lies outside the grid.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub(super) enum Boundary {
@@ -55,16 +57,17 @@ impl Medium {
         if self.boundary == Boundary::Absorbing { f64::from(self.c2).sqrt() / f64::from(self.dx) } else { 0.0 }
     }
 
-    /// A pass of a shader of this section that reads `state`, with the parameters that they share.
-    pub(super) fn bare_pass<'b, 'a>(
+    /// A pass of the shader behind the text that it shares with others.
+    fn pass_behind<'b, 'a>(
         &self,
         cx: &'b mut Lowering<'a>,
         suffix: &str,
-        shader: Shader,
+        [shared, shader]: [&Shader; 2],
         reach: Reach,
         state: ResourceId,
     ) -> PassBuilder<'b, 'a> {
-        cx.pass(suffix, shader)
+        let text = format!("{}\n{}", shared.source, shader.source);
+        cx.pass(suffix, Shader::builtin(&shader.path, &text))
             .read_with("state", state, reach, self.boundary.border(), Filter::Nearest)
             .constant("ABSORBING", self.boundary == Boundary::Absorbing)
             .param("dt", self.dt)
@@ -73,16 +76,59 @@ impl Medium {
             .param("opening", self.opening() as f32)
     }
 
-    /// The same of a shader that stands behind the ∇² of `stencil.wgsl`.
-    pub(super) fn pass<'b, 'a>(
+    /// A pass that reads `state` around each pixel, by the ∇² of `stencil.wgsl`.
+    pub(super) fn pass<'b, 'a>(&self, cx: &'b mut Lowering<'a>, suffix: &str, shader: &Shader, state: ResourceId) -> PassBuilder<'b, 'a> {
+        self.pass_behind(cx, suffix, [&shader!("simulation/stencil"), shader], Reach::Around(1, 1), state)
+    }
+
+    /// A pass of `steps` steps at once, by the ∇² of `blocked.wgsl`; its output is `out`.
+    pub(super) fn blocked_pass<'b, 'a>(
         &self,
         cx: &'b mut Lowering<'a>,
         suffix: &str,
         shader: &Shader,
-        state: ResourceId,
+        steps: u32,
+        [state, out]: [ResourceId; 2],
     ) -> PassBuilder<'b, 'a> {
-        let stencil = crate::shader!("simulation/stencil");
-        let text = format!("{}\n{}", stencil.source, shader.source);
-        self.bare_pass(cx, suffix, Shader::builtin(&shader.path, &text), Reach::Around(1, 1), state)
+        let core = 64 - 2 * steps;
+        let [w, h] = cx.image_of(state).size;
+        self.pass_behind(cx, suffix, [&shader!("simulation/blocked"), shader], Reach::Around(steps, steps), state)
+            .entry(Entry::Kernel)
+            .grid(Grid::Groups([w.div_ceil(core), h.div_ceil(core), 1]))
+            .write("out", out)
+            .constant("STEPS", steps as i32)
+            .constant("FIXED", self.boundary == Boundary::Dirichlet)
+            .constant("PERIODIC", self.boundary == Boundary::Periodic)
     }
+}
+
+/// Most steps that a GPU takes in one pass: each costs a ring of the 64×64 pixels that a workgroup holds, and spares a
+/// round trip of the state through memory.
+const BLOCK: u32 = 8;
+
+/// Takes `count` steps from `state`, on a GPU in blocks. `step` declares a pass that takes some steps from a state to the
+/// next.
+pub(super) fn in_blocks<'a>(
+    cx: &mut Lowering<'a>,
+    suffix: &str,
+    count: u32,
+    state: ResourceId,
+    step: impl Fn(&mut Lowering<'a>, [ResourceId; 2], u32),
+) -> Result<ResourceId, Mistake> {
+    let most = if cx.limits().profile == Profile::Gpu { BLOCK } else { 1 };
+    let shape = cx.shape(state);
+    let one = |cx: &mut Lowering<'a>, state: ResourceId, steps: u32| {
+        let next = cx.intermediate("next", shape);
+        step(cx, [state, next], steps);
+        next
+    };
+    let mut state = state;
+    for (steps, times) in [(most, count / most), (count % most, 1)] {
+        state = match times {
+            _ if steps == 0 || times == 0 => state,
+            1 => one(cx, state, steps),
+            _ => cx.repeat(suffix, Count::Fixed(times), &[state], |cx, states| Ok(vec![one(cx, states[0], steps)]))?[0],
+        };
+    }
+    Ok(state)
 }

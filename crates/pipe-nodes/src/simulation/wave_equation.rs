@@ -8,7 +8,7 @@ use super::energy;
 use super::implicit::Solver;
 use super::stability::exceeded_limit;
 use super::state::begin;
-use super::wave::{Boundary, Medium};
+use super::wave::{Boundary, Medium, in_blocks};
 use super::wave_twin::{Grid64, step};
 use crate::shader;
 
@@ -98,17 +98,6 @@ pub(crate) const KIND: Kind = Kind::of::<WaveEquation>(
 // Relative to the largest velocities: rounding of u is multiplied by c²·dt/dx² in each step.
 .tolerance(1e-3, 1e-4);
 
-/// Steps that a GPU takes in one pass where it can: each costs a ring of the 64×64 pixels that a workgroup holds, and
-/// spares a round trip of the state through memory.
-const BLOCK: u32 = 6;
-
-impl Integrator {
-    /// Whether a step needs ∇² of one field only, so that workgroup memory holds a large square of it.
-    const fn needs_one_field(self) -> bool {
-        matches!(self, Self::Euler | Self::SymplecticEuler | Self::Verlet)
-    }
-}
-
 impl WaveEquation {
     const fn medium(&self) -> Medium {
         Medium { dt: self.dt, dx: self.dx, c2: self.c2, damping: self.damping, boundary: self.boundary }
@@ -127,51 +116,22 @@ impl WaveEquation {
         Solver::new(theta, &self.medium(), size, f64::from(self.tolerance))
     }
 
-    /// `count` steps from `state`, as many as possible of them in blocks.
+    /// `count` explicit steps from `state`.
     fn stepped(&self, cx: &mut Lowering<'_>, count: u32, state: ResourceId) -> Result<ResourceId, Mistake> {
-        let block = if cx.limits().profile == Profile::Gpu && self.integrator.needs_one_field() { BLOCK } else { 1 };
-        let mut state = state;
-        for (size, times) in [(block, count / block), (1, count % block)] {
-            if times > 0 {
-                let suffix = if size == 1 { "step" } else { "steps" };
-                state = cx.repeat(suffix, Count::Fixed(times), &[state], |cx, states| {
-                    let next = cx.intermediate("next", cx.shape(states[0]));
-                    if size == 1 { self.single(cx, states[0], next) } else { self.block(cx, states[0], next) }
-                    Ok(vec![next])
-                })?[0];
-            }
-        }
-        Ok(state)
-    }
-
-    /// One step in one pass.
-    fn single(&self, cx: &mut Lowering<'_>, state: ResourceId, next: ResourceId) {
-        if self.integrator == Integrator::Verlet {
-            self.verlet_stage(cx, "step", 1, state, next);
-        } else {
-            self.medium()
-                .pass(cx, "step", &shader!("simulation/wave_explicit"), state)
-                .write("out", next)
-                .constant("METHOD", self.integrator as i32)
-                .add();
-        }
-    }
-
-    /// [`BLOCK`] steps in one pass.
-    fn block(&self, cx: &mut Lowering<'_>, state: ResourceId, next: ResourceId) {
-        let core = 64 - 2 * BLOCK;
-        let [w, h] = cx.image_of(state).size;
         let medium = self.medium();
-        medium
-            .bare_pass(cx, "steps", shader!("simulation/wave_blocked"), Reach::Around(BLOCK, BLOCK), state)
-            .entry(Entry::Kernel)
-            .grid(Grid::Groups([w.div_ceil(core), h.div_ceil(core), 1]))
-            .write("out", next)
-            .constant("METHOD", self.integrator as i32)
-            .constant("STEPS", BLOCK as i32)
-            .constant("FIXED", medium.boundary == Boundary::Dirichlet)
-            .constant("PERIODIC", medium.boundary == Boundary::Periodic)
-            .add();
+        in_blocks(cx, "steps", count, state, |cx, [state, next], steps| {
+            if steps > 1 {
+                medium
+                    .blocked_pass(cx, "steps", &shader!("simulation/wave_blocked"), steps, [state, next])
+                    .constant("METHOD", self.integrator as i32)
+                    .add();
+            } else if self.integrator == Integrator::Verlet {
+                self.verlet_stage(cx, "step", 1, state, next);
+            } else {
+                let shader = shader!("simulation/wave_explicit");
+                medium.pass(cx, "step", &shader, state).write("out", next).constant("METHOD", self.integrator as i32).add();
+            }
+        })
     }
 
     fn verlet(&self, cx: &mut Lowering<'_>, state: ResourceId) -> Result<ResourceId, Mistake> {
@@ -207,18 +167,18 @@ impl WaveEquation {
                 .write("guess", guess)
                 .param("theta", theta)
                 .add();
-            let solution = cx.repeat("solve", Count::Fixed(solver.iterations), &[guess], |cx, pair| {
-                let next = cx.intermediate("solution", shape);
-                medium
-                    .pass(cx, "relax", &shader!("simulation/wave_relax"), pair[0])
-                    .read("rhs", rhs, Reach::Point)
-                    .write("out", next)
-                    .param("theta", theta)
-                    .param("gain", solver.gain as f32)
-                    .param("inertia", solver.inertia as f32)
-                    .add();
-                Ok(vec![next])
-            })?[0];
+            let solution = in_blocks(cx, "solve", solver.iterations, guess, |cx, [pair, next], steps| {
+                let pass = if steps > 1 {
+                    let shader = shader!("simulation/relax_blocked");
+                    let border = medium.boundary.border();
+                    medium
+                        .blocked_pass(cx, "relax", &shader, steps, [pair, next])
+                        .read_with("rhs", rhs, Reach::Around(steps, steps), border, Filter::Nearest)
+                } else {
+                    medium.pass(cx, "relax", &shader!("simulation/wave_relax"), pair).read("rhs", rhs, Reach::Point).write("out", next)
+                };
+                pass.param("theta", theta).param("gain", solver.gain as f32).param("inertia", solver.inertia as f32).add();
+            })?;
             let next = cx.intermediate("next", shape);
             cx.pass("finish", shader!("simulation/wave_finish"))
                 .entry(Entry::Point)
