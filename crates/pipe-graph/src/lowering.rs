@@ -55,6 +55,7 @@ pub struct Lowering<'a> {
     pub(crate) border: Border,
     pub(crate) filter: Filter,
     pub(crate) seed: u64,
+    pub(crate) frames_before: Option<u32>,
 }
 
 /// What the phase `lower` knows when it asks a node for its passes.
@@ -80,6 +81,8 @@ pub struct Site<'a> {
     pub filter: Filter,
     /// `--seed`, 0 unless given.
     pub seed: u64,
+    /// How many frames ran before this one; `None` inside an iteration, where there are no frames.
+    pub frames_before: Option<u32>,
 }
 
 impl<'a> Lowering<'a> {
@@ -99,6 +102,7 @@ impl<'a> Lowering<'a> {
             border: site.border,
             filter: site.filter,
             seed: site.seed,
+            frames_before: site.frames_before,
         }
     }
 
@@ -120,6 +124,23 @@ impl<'a> Lowering<'a> {
     /// The user's `--seed`, to be mixed with the node's own.
     pub fn seed(&self) -> u64 {
         self.seed
+    }
+
+    /// How many frames ran before this one; `None` inside an iteration, where there are no frames.
+    pub fn frames_before(&self) -> Option<u32> {
+        self.frames_before
+    }
+
+    /// What [`Lowering::keep`] kept under this suffix in the frame before this one.
+    pub fn recall(&mut self, suffix: &str, shape: Shape) -> ResourceId {
+        let name = format!("{}.{suffix}", self.name);
+        let origin = Origin::History { name: name.clone(), delay: 1 };
+        self.graph.add(Resource { name, shape, origin })
+    }
+
+    /// Keeps a resource for the next frame.
+    pub fn keep(&mut self, suffix: &str, id: ResourceId) {
+        self.graph.kept.push((format!("{}.{suffix}", self.name), id));
     }
 
     /// The border policy of this node.

@@ -45,7 +45,7 @@ pub fn readback_name(instance: &Instance) -> String {
 
 /// Lowers a graph.
 pub fn lower(graph: &Graph, rim: &Rim, limits: &Limits) -> Result<PassGraph, PlanError> {
-    let mut lowerer = Lowerer { passes: PassGraph::default(), rim, limits, files: HashMap::new(), decoding: Vec::new() };
+    let mut lowerer = Lowerer { passes: PassGraph::default(), rim, limits, files: HashMap::new(), decoding: Vec::new(), depth: 0 };
     let mut values = HashMap::new();
     let mut items = lowerer.region(graph, &mut values)?;
     let outputs = graph.outputs().map(|(name, value)| (name.to_owned(), value));
@@ -73,6 +73,8 @@ struct Lowerer<'a> {
     /// Files that nodes read, and the passes that decode them, which come before everything else.
     files: HashMap<String, ResourceId>,
     decoding: Vec<Item>,
+    /// Iterations around what is being lowered.
+    depth: u32,
 }
 
 type Values = HashMap<ValueRef, Carried>;
@@ -188,6 +190,7 @@ impl Lowerer<'_> {
             border: instance.options.border,
             filter: instance.options.filter,
             seed: self.rim.seed,
+            frames_before: (self.depth == 0 && times == 1).then_some(self.rim.frames_before),
         };
         let mut cx = Lowering::new(&mut self.passes, &site);
         work.lower(&mut cx).map_err(|m| refused(&instance.name, &m))?;
@@ -249,7 +252,10 @@ impl Lowerer<'_> {
             inside.insert(ValueRef { node: at, port: 0 }, value);
         }
         carried.sort_unstable();
-        let body = self.region(&iteration.body, &mut inside)?;
+        self.depth += 1;
+        let body = self.region(&iteration.body, &mut inside);
+        self.depth -= 1;
+        let body = body?;
         let one = |c: Carried| match c {
             Carried::One(id) => id,
             Carried::Mesh(_) => unreachable!("states are not meshes"),
@@ -310,6 +316,7 @@ fn rim_site<'s>(label: NodeLabel, name: &'s str, limits: &'s Limits) -> Site<'s>
         border: Border::Clamp,
         filter: Filter::Linear,
         seed: 0,
+        frames_before: None,
     }
 }
 

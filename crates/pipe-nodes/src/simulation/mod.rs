@@ -1,5 +1,6 @@
 //! Iteration and simulation.
 
+mod accumulate;
 mod energy;
 mod heat_diffusion;
 mod implicit;
@@ -16,5 +17,12 @@ mod wave_twin;
 use pipe_graph::node::Kind;
 
 /// The kinds of this section, in the order of the reference.
-pub(crate) const KINDS: &[Kind] =
-    &[wave_equation::KIND, wave_step::KIND, heat_diffusion::KIND, reaction_diffusion::KIND, life::KIND, jacobi::KIND];
+pub(crate) const KINDS: &[Kind] = &[
+    wave_equation::KIND,
+    wave_step::KIND,
+    heat_diffusion::KIND,
+    reaction_diffusion::KIND,
+    life::KIND,
+    jacobi::KIND,
+    accumulate::KIND,
+];

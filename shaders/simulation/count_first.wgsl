@@ -1,0 +1,3 @@
+fn at(i: i32) -> vec4f {
+    return vec4f(1.0);
+}
