@@ -41,7 +41,11 @@ fn main() {
             }
         }
     }
-    println!("\ntest result: {}. {passed} passed; {} failed; 0 ignored; 0 measured; 0 filtered out", if failed.is_empty() { "ok" } else { "FAILED" }, failed.len());
+    println!(
+        "\ntest result: {}. {passed} passed; {} failed; 0 ignored; 0 measured; 0 filtered out",
+        if failed.is_empty() { "ok" } else { "FAILED" },
+        failed.len()
+    );
     if !failed.is_empty() {
         std::process::exit(101);
     }
@@ -49,14 +53,16 @@ fn main() {
 
 /// The graph of one example: `{options}` is put behind its fields.
 fn graph_text(kind: &Kind, example: &str, options: &str, ports: &[String]) -> String {
-    let inputs: String = named(example).map(|n| {
-        let ty = match edge_type(n, [1, 1]) {
-            EdgeType::Table(_) => "Table",
-            EdgeType::Volume(_) => "Volume",
-            _ => "Image",
-        };
-        format!("\"{n}\": {ty}, ")
-    }).collect();
+    let inputs: String = named(example)
+        .map(|n| {
+            let ty = match edge_type(n, [1, 1]) {
+                EdgeType::Table(_) => "Table",
+                EdgeType::Volume(_) => "Volume",
+                _ => "Image",
+            };
+            format!("\"{n}\": {ty}, ")
+        })
+        .collect();
     let scalar = if example.contains("\"scalar\"") { "\"scalar\": ScalarSource()," } else { "" };
     let end = example.rfind(')').expect("an example is a call");
     let comma = if example[..end].trim_end().ends_with('(') { "" } else { ", " };
@@ -92,7 +98,9 @@ fn reach_is_true(bench: &mut Bench, kind: &Kind, example: &str) -> Result<(), St
     let near = |x: i64, y: i64| (x - cx).abs() <= i64::from(rx) && (y - cy).abs() <= i64::from(ry);
     let same = |name: &str| edge(name, size);
     let changed = |name: &str| match edge(name, size) {
-        Tensor::Image(r) => Tensor::Image(Raster::from_fn(r.size, r.channels, |x, y| if near(x, y) { r.at(x, y) } else { [0.875, 3.5, -0.25, 0.5] })),
+        Tensor::Image(r) => {
+            Tensor::Image(Raster::from_fn(r.size, r.channels, |x, y| if near(x, y) { r.at(x, y) } else { [0.875, 3.5, -0.25, 0.5] }))
+        }
         other => other,
     };
     let (a, b) = (bench.gpu(&graph, &same)?, bench.gpu(&graph, &changed)?);
@@ -104,7 +112,11 @@ fn reach_is_true(bench: &mut Bench, kind: &Kind, example: &str) -> Result<(), St
         let at = (cy as usize * 61 + cx as usize) * t.channels as usize;
         let pixel = |v: &pipe_tests::bench::Values| v[name][at..at + t.channels as usize].to_vec();
         if pixel(&a) != pixel(&b) {
-            return Err(format!("its reach is declared as ({rx}, {ry}), but a pixel further away changes `{name}`: {:?} and {:?}", pixel(&a), pixel(&b)));
+            return Err(format!(
+                "its reach is declared as ({rx}, {ry}), but a pixel further away changes `{name}`: {:?} and {:?}",
+                pixel(&a),
+                pixel(&b)
+            ));
         }
     }
     Ok(())
@@ -157,7 +169,10 @@ fn one(bench: &mut Bench, kind: &Kind, example: &str, size: [u32; 2], options: &
             let bound = kind.tolerance.absolute + kind.tolerance.relative * e.abs();
             let fits = (g - e).abs() <= bound || (g.is_nan() && e.is_nan()) || g == e;
             if !fits {
-                return Err(format!("`{port}`[{i}] is {g}, expected {e} (off by {:.3e}, allowed {bound:.3e}) at {size:?} {options}", (g - e).abs()));
+                return Err(format!(
+                    "`{port}`[{i}] is {g}, expected {e} (off by {:.3e}, allowed {bound:.3e}) at {size:?} {options}",
+                    (g - e).abs()
+                ));
             }
         }
     }

@@ -62,7 +62,11 @@ fn presets_agree_with_their_twins_and_goldens() {
             continue;
         }
         seen += 1;
-        let request = Request { inputs: [(document.inputs[0].name.value.clone(), EdgeType::image(picture.size, 4))].into(), frame: 1.0, ..Request::default() };
+        let request = Request {
+            inputs: [(document.inputs[0].name.value.clone(), EdgeType::image(picture.size, 4))].into(),
+            frame: 1.0,
+            ..Request::default()
+        };
         let graph = project.resolve(&request, &World::default()).unwrap_or_else(|| panic!("{}", project.render(false)));
         let twin = evaluate(&graph, &|_| Tensor::Image(picture.clone()));
         let (_, value) = graph.outputs().next().expect("it has one output");
@@ -75,12 +79,17 @@ fn presets_agree_with_their_twins_and_goldens() {
         session.run(&job).unwrap_or_else(|e| panic!("{name}: {e}"));
         let got = read(&out);
         let channels = got.channels.count();
-        let expected: Vec<i32> = twin.pixels.iter().flat_map(|p| (0..channels).map(|c| if c == 3 { (p[3].clamp(0.0, 1.0) * 255.0 + 0.5) as i32 } else { encode(p[c]) })).collect();
+        let expected: Vec<i32> = twin
+            .pixels
+            .iter()
+            .flat_map(|p| (0..channels).map(|c| if c == 3 { (p[3].clamp(0.0, 1.0) * 255.0 + 0.5) as i32 } else { encode(p[c]) }))
+            .collect();
         let golden = path(&format!("golden/{name}.png"));
         if bless {
             let bytes = expected.iter().map(|v| *v as u8).collect();
             let target = pipe_io::Target::parse(&golden).expect("a png");
-            let options = pipe_io::WriteOptions { channels: Some(got.channels), compression: Some(pipe_io::Compression::Best), ..Default::default() };
+            let options =
+                pipe_io::WriteOptions { channels: Some(got.channels), compression: Some(pipe_io::Compression::Best), ..Default::default() };
             pipe_io::write(&target, &Picture { bytes, ..got.clone() }, &options).unwrap_or_else(|e| panic!("{e}"));
         }
         for (what, other) in [("its twin", &expected), ("its golden", &bytes(&read(&golden)))] {

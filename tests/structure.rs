@@ -127,12 +127,27 @@ fn fused_is_unfused() {
     let mut bench = Bench::new();
     // A chain, a diamond, a tree, a stencil behind points, points behind a stencil, a driven parameter.
     for (nodes, output) in [
-        (r#""a": Exposure(image: "in", ev: 1), "b": Saturation(image: "a", factor: 0.5), "c": Gamma(image: "b", gamma: 1.3), "d": Invert(image: "c")"#, "d"),
-        (r#""a": Exposure(image: "in", ev: 1), "b": Invert(image: "a"), "c": Saturation(image: "a", factor: 0), "d": Math(a: "b", b: "c", op: Mul)"#, "d"),
-        (r#""a": Invert(image: "in"), "b": Exposure(image: "other", ev: -1), "c": Mix(a: "a", b: "b", factor: 0.3), "d": Clamp(image: "c")"#, "d"),
+        (
+            r#""a": Exposure(image: "in", ev: 1), "b": Saturation(image: "a", factor: 0.5), "c": Gamma(image: "b", gamma: 1.3), "d": Invert(image: "c")"#,
+            "d",
+        ),
+        (
+            r#""a": Exposure(image: "in", ev: 1), "b": Invert(image: "a"), "c": Saturation(image: "a", factor: 0), "d": Math(a: "b", b: "c", op: Mul)"#,
+            "d",
+        ),
+        (
+            r#""a": Invert(image: "in"), "b": Exposure(image: "other", ev: -1), "c": Mix(a: "a", b: "b", factor: 0.3), "d": Clamp(image: "c")"#,
+            "d",
+        ),
         (r#""a": Luminance(image: "in"), "b": Sobel(image: "a", options: (border: Black)), "c": Invert(image: "b")"#, "c"),
-        (r#""a": Exposure(image: "in", ev: 2), "b": GaussianBlur(image: "a", sigma: 2, options: (border: Repeat)), "c": Math(a: "b", b: "a", op: Sub)"#, "c"),
-        (r#""y": Luminance(image: "in"), "m": PyramidAverage(image: "y", mean: Arithmetic), "t": ToneMap(image: "in", average: "m"), "i": Invert(image: "t")"#, "i"),
+        (
+            r#""a": Exposure(image: "in", ev: 2), "b": GaussianBlur(image: "a", sigma: 2, options: (border: Repeat)), "c": Math(a: "b", b: "a", op: Sub)"#,
+            "c",
+        ),
+        (
+            r#""y": Luminance(image: "in"), "m": PyramidAverage(image: "y", mean: Arithmetic), "t": ToneMap(image: "in", average: "m"), "i": Invert(image: "t")"#,
+            "i",
+        ),
     ] {
         both_ways(&mut bench, nodes, output);
     }
@@ -140,7 +155,9 @@ fn fused_is_unfused() {
 
 #[test]
 fn a_chain_of_eight_point_nodes_is_one_pass() {
-    let nodes: String = (0..8).map(|i| format!(r#""n{i}": Exposure(image: "{}", ev: 0.1),"#, if i == 0 { "in".to_owned() } else { format!("n{}", i - 1) })).collect();
+    let nodes: String = (0..8)
+        .map(|i| format!(r#""n{i}": Exposure(image: "{}", ev: 0.1),"#, if i == 0 { "in".to_owned() } else { format!("n{}", i - 1) }))
+        .collect();
     let graph = graph(&nodes, "n7");
     let plan = plan(&graph, &pipe_graph::pass::Limits::default(), &Options::default()).unwrap_or_else(|e| panic!("{e}"));
     assert_eq!(plan.pass_count(), 1, "{}", plan.to_text());

@@ -5,7 +5,8 @@ use pipe_graph::reference::{Block, Raster, Tensor};
 
 /// A number in 0..1 from two integers (SplitMix64).
 pub fn hash(seed: u64, i: u64) -> f64 {
-    let mut z = seed.wrapping_mul(0x9E37_79B9_7F4A_7C15).wrapping_add(i.wrapping_mul(0xBF58_476D_1CE4_E5B9)).wrapping_add(0x94D0_49BB_1331_11EB);
+    let mut z =
+        seed.wrapping_mul(0x9E37_79B9_7F4A_7C15).wrapping_add(i.wrapping_mul(0xBF58_476D_1CE4_E5B9)).wrapping_add(0x94D0_49BB_1331_11EB);
     z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
     z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
     ((z ^ (z >> 31)) >> 11) as f64 / (1_u64 << 53) as f64
@@ -109,7 +110,9 @@ pub fn bytes(tensor: &Tensor, ty: &EdgeType) -> Vec<u8> {
     match (tensor, ty) {
         (Tensor::Image(r), _) => floats(&r.pixels, r.channels),
         (Tensor::Volume(b), _) => floats(&b.voxels, b.channels),
-        (Tensor::Table(t), EdgeType::Table(TableType { element: Element::U32, .. })) => t.iter().flat_map(|v| (*v as u32).to_le_bytes()).collect(),
+        (Tensor::Table(t), EdgeType::Table(TableType { element: Element::U32, .. })) => {
+            t.iter().flat_map(|v| (*v as u32).to_le_bytes()).collect()
+        }
         (Tensor::Table(t), _) => t.iter().flat_map(|v| (*v as f32).to_le_bytes()).collect(),
         _ => Vec::new(),
     }

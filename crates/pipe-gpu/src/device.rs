@@ -63,8 +63,7 @@ impl Device {
             trace: wgpu::Trace::Off,
         });
         let info = adapter.get_info();
-        let (device, queue) =
-            pollster::block_on(request).map_err(|e| GpuError::Open { name: info.name.clone(), reason: e.to_string() })?;
+        let (device, queue) = pollster::block_on(request).map_err(|e| GpuError::Open { name: info.name.clone(), reason: e.to_string() })?;
         let trouble = Arc::new(Trouble::default());
         let (of_lost, of_errors) = (trouble.clone(), trouble.clone());
         device.set_device_lost_callback(move |reason, message| {

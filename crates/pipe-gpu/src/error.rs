@@ -41,7 +41,9 @@ pub enum GpuError {
         bytes: u64,
     },
     /// Something is larger than the device can hold in one piece.
-    #[error("`{what}` needs {size}, this device allows {limit}\n  next: shrink the image, or choose another device (`pipe devices` lists their limits)")]
+    #[error(
+        "`{what}` needs {size}, this device allows {limit}\n  next: shrink the image, or choose another device (`pipe devices` lists their limits)"
+    )]
     TooLarge {
         /// The graph and the slot.
         what: String,
@@ -63,7 +65,9 @@ pub enum GpuError {
         largest: String,
     },
     /// The work took longer than `--timeout`.
-    #[error("`{node}` did not finish within {limit:?}\n  next: give it more with --timeout SECONDS, or look for an endless loop in its shader")]
+    #[error(
+        "`{node}` did not finish within {limit:?}\n  next: give it more with --timeout SECONDS, or look for an endless loop in its shader"
+    )]
     Timeout {
         /// The passes that were running: those of one submission.
         node: String,
@@ -71,7 +75,9 @@ pub enum GpuError {
         limit: std::time::Duration,
     },
     /// The device went away.
-    #[error("the device was lost while running `{node}`: {reason}\n  next: run `pipe doctor`; if it happens again, lower the work per pass or try --device cpu")]
+    #[error(
+        "the device was lost while running `{node}`: {reason}\n  next: run `pipe doctor`; if it happens again, lower the work per pass or try --device cpu"
+    )]
     Lost {
         /// The pass.
         node: String,

@@ -136,7 +136,11 @@ impl Executor {
             && old.histories == plan.histories
             && old.uploads == plan.uploads
             && old.uniforms.len() == plan.uniforms.len()
-            && old.literals.iter().map(|(slot, bytes)| (slot, bytes.len())).eq(plan.literals.iter().map(|(slot, bytes)| (slot, bytes.len())));
+            && old
+                .literals
+                .iter()
+                .map(|(slot, bytes)| (slot, bytes.len()))
+                .eq(plan.literals.iter().map(|(slot, bytes)| (slot, bytes.len())));
         if !same {
             return Ok(false);
         }
@@ -216,8 +220,7 @@ impl Executor {
 
         let started = Instant::now();
         self.histories.keep(&self.device, plan, &prepared.memory)?;
-        let parts: Vec<_> =
-            plan.fetches.iter().flat_map(|f| f.parts.iter().map(|(slot, range)| (f.name.as_str(), *slot, range))).collect();
+        let parts: Vec<_> = plan.fetches.iter().flat_map(|f| f.parts.iter().map(|(slot, range)| (f.name.as_str(), *slot, range))).collect();
         let one = |(_, slot, range): &(&str, _, &Range<u64>)| Ok((memory(prepared, *slot)?.buffer(&plan.name)?, range.end - range.start));
         let buffers = parts.iter().map(one).collect::<Result<Vec<_>, GpuError>>()?;
         self.transfer.download(&self.device, &buffers, &patience, &plan.name, &mut |i, at, bytes| {

@@ -50,9 +50,25 @@ pub struct FormatSupport {
 pub(crate) fn support(adapter: &wgpu::Adapter) -> Vec<FormatSupport> {
     use TextureFormat as F;
     let all = [
-        F::R8Unorm, F::Rg8Unorm, F::Rgba8Unorm, F::Rgba8UnormSrgb, F::Bgra8Unorm, F::R16Float, F::Rg16Float, F::Rgba16Float,
-        F::R32Float, F::Rg32Float, F::Rgba32Float, F::R32Uint, F::R32Sint, F::Rg32Uint, F::Rgba32Uint, F::Rgba16Uint,
-        F::Rgb10a2Unorm, F::Rg11b10Ufloat, F::Depth32Float,
+        F::R8Unorm,
+        F::Rg8Unorm,
+        F::Rgba8Unorm,
+        F::Rgba8UnormSrgb,
+        F::Bgra8Unorm,
+        F::R16Float,
+        F::Rg16Float,
+        F::Rgba16Float,
+        F::R32Float,
+        F::Rg32Float,
+        F::Rgba32Float,
+        F::R32Uint,
+        F::R32Sint,
+        F::Rg32Uint,
+        F::Rgba32Uint,
+        F::Rgba16Uint,
+        F::Rgb10a2Unorm,
+        F::Rg11b10Ufloat,
+        F::Depth32Float,
     ];
     let one = |format: F| {
         let features = adapter.get_texture_format_features(format);

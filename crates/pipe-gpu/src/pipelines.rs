@@ -61,11 +61,8 @@ impl Pipelines {
         let Some(key) = wgpu::util::pipeline_cache_key(&device.info) else { return Self::default() };
         let file = folder.join(format!("{key}-{}", env!("CARGO_PKG_VERSION")));
         let known = std::fs::read(&file).unwrap_or_default();
-        let desc = wgpu::PipelineCacheDescriptor {
-            label: Some("pipe"),
-            data: (!known.is_empty()).then_some(known.as_slice()),
-            fallback: true,
-        };
+        let desc =
+            wgpu::PipelineCacheDescriptor { label: Some("pipe"), data: (!known.is_empty()).then_some(known.as_slice()), fallback: true };
         // SAFETY: the data came from `PipelineCache::get_data` of the same adapter, driver and program version, which
         // the file's name says; it was written whole and renamed, so it is never half a file.
         #[allow(unsafe_code)]
@@ -74,12 +71,7 @@ impl Pipelines {
     }
 
     /// Compiles what is not there yet; `nodes[i]` names kernel i in messages.
-    pub(crate) fn compile(
-        &mut self,
-        device: &Device,
-        kernels: &[Kernel],
-        nodes: &[String],
-    ) -> Result<Vec<Arc<Pipeline>>, GpuError> {
+    pub(crate) fn compile(&mut self, device: &Device, kernels: &[Kernel], nodes: &[String]) -> Result<Vec<Arc<Pipeline>>, GpuError> {
         let missing: Vec<usize> = (0..kernels.len()).filter(|i| !self.made.contains_key(&kernels[*i])).collect();
         if !missing.is_empty() {
             let cache = self.disk.as_ref().map(|d| &d.cache);
@@ -132,7 +124,8 @@ impl Pipelines {
 fn layout_entry(binding: u32, kind: Binding, launch: Launch) -> wgpu::BindGroupLayoutEntry {
     use wgpu::{BindingType as T, BufferBindingType as B, StorageTextureAccess, TextureSampleType, TextureViewDimension as D};
     let buffer = |ty| T::Buffer { ty, has_dynamic_offset: false, min_binding_size: None };
-    let sampled = |view_dimension| T::Texture { sample_type: TextureSampleType::Float { filterable: false }, view_dimension, multisampled: false };
+    let sampled =
+        |view_dimension| T::Texture { sample_type: TextureSampleType::Float { filterable: false }, view_dimension, multisampled: false };
     let ty = match kind {
         Binding::Uniform { .. } => buffer(B::Uniform),
         Binding::SampledImage => sampled(D::D2),
@@ -161,7 +154,8 @@ fn compile(device: &Device, kernel: &Kernel, node: &str, cache: Option<&wgpu::Pi
     {
         return Err(GpuError::Unsupported { node: node.to_owned(), what: "blending into 32-bit float images" });
     }
-    let scopes = [wgpu::ErrorFilter::OutOfMemory, wgpu::ErrorFilter::Internal, wgpu::ErrorFilter::Validation].map(|f| gpu.push_error_scope(f));
+    let scopes =
+        [wgpu::ErrorFilter::OutOfMemory, wgpu::ErrorFilter::Internal, wgpu::ErrorFilter::Validation].map(|f| gpu.push_error_scope(f));
     let desc = wgpu::ShaderModuleDescriptor {
         label: Some(&kernel.label),
         source: wgpu::ShaderSource::Wgsl(std::borrow::Cow::Borrowed(&kernel.wgsl)),
@@ -183,8 +177,7 @@ fn compile(device: &Device, kernel: &Kernel, node: &str, cache: Option<&wgpu::Pi
         bind_group_layouts: &[Some(&layout)],
         immediate_size: 0,
     });
-    let compilation_options =
-        wgpu::PipelineCompilationOptions { zero_initialize_workgroup_memory: !kernel.trusted, ..Default::default() };
+    let compilation_options = wgpu::PipelineCompilationOptions { zero_initialize_workgroup_memory: !kernel.trusted, ..Default::default() };
     let launch = match kernel.launch {
         Launch::Compute => Compiled::Compute(gpu.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
             label: Some(&kernel.label),

@@ -36,7 +36,8 @@ fn single(label: &str, wgsl: &str, slots: Vec<Slot>, bindings: Vec<Binding>, gro
     let ids: Vec<SlotId> = (0..slots.len()).map(|i| SlotId(i as u32)).collect();
     let bytes: u64 = slots.iter().map(|s| s.storage.bytes()).sum();
     let uploads = ids.iter().zip(&slots).filter(|(_, s)| s.uploaded);
-    let uploads = uploads.map(|(id, s)| Upload { name: "in".into(), ranges: std::iter::once(0..s.storage.bytes()).collect(), slot: *id }).collect();
+    let uploads =
+        uploads.map(|(id, s)| Upload { name: "in".into(), ranges: std::iter::once(0..s.storage.bytes()).collect(), slot: *id }).collect();
     let fetches = ids.iter().zip(&slots).filter(|(_, s)| s.fetched);
     let fetches = fetches.map(|(id, s)| Fetched { name: "out".into(), parts: vec![(*id, 0..s.storage.bytes())] }).collect();
     Plan {
@@ -167,7 +168,11 @@ pub fn examine(device: &Device) -> Result<Vec<Finding>, GpuError> {
         },
         good: halves && device.limits().half_storage,
         vital: !halves,
-        hint: if halves { "1- and 2-channel half images take the memory of float ones here" } else { "options: (format: F16) gives wrong results" },
+        hint: if halves {
+            "1- and 2-channel half images take the memory of float ones here"
+        } else {
+            "options: (format: F16) gives wrong results"
+        },
     });
     findings.push(Finding {
         name: "timestamps",
@@ -202,7 +207,8 @@ fn half_images(executor: &mut Executor) -> Result<bool, GpuError> {
              @compute @workgroup_size(16) fn main(@builtin(global_invocation_id) id: vec3u) { b[id.x] = textureLoad(a, id.xy, 0); }";
         let slot = Slot { storage: Storage::Image(image), uploaded: false, fetched: false };
         let mut plan = single("half images", &write, vec![slot], vec![Binding::StorageImage(image)], [1, 1, 1]);
-        let mut second = single("half images", read, vec![buffer(256, false, true)], vec![Binding::SampledImage, Binding::WriteBuffer], [1, 1, 1]);
+        let mut second =
+            single("half images", read, vec![buffer(256, false, true)], vec![Binding::SampledImage, Binding::WriteBuffer], [1, 1, 1]);
         plan.slots.append(&mut second.slots);
         plan.kernels.append(&mut second.kernels);
         if let Some(Step::Run(mut run)) = second.steps.pop() {

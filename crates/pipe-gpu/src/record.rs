@@ -242,8 +242,7 @@ impl<'a> Recorder<'a> {
             self.pass = None;
         }
         let device = self.device;
-        let encoder =
-            self.encoder.get_or_insert_with(|| device.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default()));
+        let encoder = self.encoder.get_or_insert_with(|| device.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default()));
         let pass = self.pass.get_or_insert_with(|| {
             let timestamp_writes = stamp.map(|(query_set, i)| wgpu::ComputePassTimestampWrites {
                 query_set,

@@ -100,11 +100,7 @@ pub(crate) fn check(device: &Device, plan: &Plan, budget: Option<u64>) -> Result
             Storage::Buffer { bytes } => {
                 let most = limits.max_binding_bytes.min(device.max_buffer);
                 if bytes > most {
-                    return Err(GpuError::TooLarge {
-                        what: what(),
-                        size: format!("a buffer of {}", size(bytes)),
-                        limit: size(most),
-                    });
+                    return Err(GpuError::TooLarge { what: what(), size: format!("a buffer of {}", size(bytes)), limit: size(most) });
                 }
                 (Vec::new(), 0)
             }
@@ -121,9 +117,7 @@ pub(crate) fn check(device: &Device, plan: &Plan, budget: Option<u64>) -> Result
     }
     let needed = bytes_needed(plan);
     match budget.into_iter().chain(plan.limits.budget).min() {
-        Some(budget) if needed > budget => {
-            Err(GpuError::OverBudget { what: plan.name.clone(), needed, budget, largest: largest(plan) })
-        }
+        Some(budget) if needed > budget => Err(GpuError::OverBudget { what: plan.name.clone(), needed, budget, largest: largest(plan) }),
         _ => Ok(()),
     }
 }
@@ -160,8 +154,7 @@ pub(crate) fn allocate(device: &Device, slot: &Slot, target: bool, what: &str) -
     let scope = gpu.push_error_scope(wgpu::ErrorFilter::OutOfMemory);
     let texture = |size: [u32; 3], dimension, format| {
         // COPY_DST keeps wgpu from clearing the texture with a render pass at its first use.
-        let mut usage =
-            TextureUsages::TEXTURE_BINDING | TextureUsages::STORAGE_BINDING | TextureUsages::COPY_SRC | TextureUsages::COPY_DST;
+        let mut usage = TextureUsages::TEXTURE_BINDING | TextureUsages::STORAGE_BINDING | TextureUsages::COPY_SRC | TextureUsages::COPY_DST;
         if target {
             usage |= TextureUsages::RENDER_ATTACHMENT;
         }

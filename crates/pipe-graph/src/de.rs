@@ -122,9 +122,7 @@ pub fn build_node(kind: &Kind, fields: &[(Spanned<String>, Tree)], whole: Span, 
     check_ranges(&schema, fields, env, &mut diagnostics);
     for name in required_inputs(&schema) {
         if !fields.iter().any(|(key, _)| key.value == name) {
-            diagnostics.push(
-                Diagnostic::error(whole, format!("missing input `{name}`")).label(format!("expected `{name}: \"NAME\"`")),
-            );
+            diagnostics.push(Diagnostic::error(whole, format!("missing input `{name}`")).label(format!("expected `{name}: \"NAME\"`")));
         }
     }
     let node = if diagnostics.is_empty() { node } else { None };
@@ -138,11 +136,7 @@ pub fn from_tree<T: DeserializeOwned>(tree: &Tree, env: &Env) -> (Option<T>, Vec
     (value, edges, diagnostics)
 }
 
-fn read<T>(
-    tree: &Tree,
-    env: &Env,
-    build: impl Fn(TreeDeserializer<'_>) -> Result<T, Error>,
-) -> (Option<T>, Vec<EdgeUse>, Vec<Diagnostic>) {
+fn read<T>(tree: &Tree, env: &Env, build: impl Fn(TreeDeserializer<'_>) -> Result<T, Error>) -> (Option<T>, Vec<EdgeUse>, Vec<Diagnostic>) {
     let mut tree = tree.clone();
     let mut diagnostics = Vec::new();
     loop {
@@ -156,7 +150,9 @@ fn read<T>(
         // The field that holds the place is taken away for the next try.
         let Syntax::Struct(_, fields) = &mut tree.value else { return (None, Vec::new(), diagnostics) };
         let within = |outer: Span| at.is_some_and(|at| outer.start <= at.start && at.end <= outer.end && at != outer);
-        let holds = |(key, value): &(Spanned<String>, Tree)| within(key.span) || within(value.span) || at == Some(key.span) || at == Some(value.span);
+        let holds = |(key, value): &(Spanned<String>, Tree)| {
+            within(key.span) || within(value.span) || at == Some(key.span) || at == Some(value.span)
+        };
         match fields.iter().rposition(holds) {
             Some(i) => drop(fields.remove(i)),
             None => return (None, Vec::new(), diagnostics),
@@ -350,7 +346,9 @@ impl<'de> de::Deserializer<'de> for TreeDeserializer<'_> {
             Syntax::None => self.place(visitor.visit_none()),
             // A bare name is a unit variant; serde's untagged enums take it as text.
             Syntax::Tuple(Some(name), values) if values.is_empty() => self.place(visitor.visit_str(&name.value)),
-            Syntax::Tuple(None, values) | Syntax::List(values) => self.place(visitor.visit_seq(Elements { d: self, values: values.iter() })),
+            Syntax::Tuple(None, values) | Syntax::List(values) => {
+                self.place(visitor.visit_seq(Elements { d: self, values: values.iter() }))
+            }
             Syntax::Tuple(Some(_), _) | Syntax::Struct(Some(_), _) => self.place(visitor.visit_enum(Variant { d: self })),
             Syntax::Struct(None, fields) => self.place(visitor.visit_map(Fields::new(self, fields))),
             Syntax::Map(entries) => self.place(visitor.visit_map(Entries { d: self, entries: entries.iter(), value: None })),
@@ -453,7 +451,9 @@ impl<'de> de::Deserializer<'de> for TreeDeserializer<'_> {
             Syntax::List(values) | Syntax::Tuple(_, values) => {
                 let wanted = ExpectedText(&visitor).to_string();
                 let elements = Elements { d: self, values: values.iter() };
-                visitor.visit_seq(elements).map_err(|e| if e.span.is_none() { Error { label: format!("expected {wanted}"), span: Some(self.tree.span), ..e } } else { e })
+                visitor.visit_seq(elements).map_err(|e| {
+                    if e.span.is_none() { Error { label: format!("expected {wanted}"), span: Some(self.tree.span), ..e } } else { e }
+                })
             }
             _ => Err(self.wrong("a list")),
         }

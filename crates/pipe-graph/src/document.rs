@@ -110,8 +110,7 @@ pub fn parse(path: &Path, text: &str, registry: &Registry, sources: &mut Sources
     };
     let Syntax::Struct(head, fields) = &tree.value else {
         diagnostics.push(
-            Diagnostic::error(tree.span, "a graph file is one `Graph(…)`")
-                .label("expected `Graph(version: 1, nodes: {…}, outputs: {…})`"),
+            Diagnostic::error(tree.span, "a graph file is one `Graph(…)`").label("expected `Graph(version: 1, nodes: {…}, outputs: {…})`"),
         );
         return None;
     };
@@ -171,8 +170,7 @@ impl Reader<'_> {
         let nodes = match sections.get("nodes") {
             Some(nodes) => self.calls(nodes),
             None => {
-                self.diagnostics
-                    .push(Diagnostic::error(tree.span, "the graph has no nodes").label("expected `nodes: {…}`"));
+                self.diagnostics.push(Diagnostic::error(tree.span, "the graph has no nodes").label("expected `nodes: {…}`"));
                 Vec::new()
             }
         };
@@ -222,8 +220,8 @@ impl Reader<'_> {
 
     fn check_name(&mut self, name: &Spanned<String>) {
         let first = name.value.chars().next();
-        let fits = first.is_some_and(|c| c.is_alphabetic() || c == '_')
-            && name.value.chars().all(|c| c.is_alphanumeric() || c == '_' || c == '-');
+        let fits =
+            first.is_some_and(|c| c.is_alphabetic() || c == '_') && name.value.chars().all(|c| c.is_alphanumeric() || c == '_' || c == '-');
         if !fits {
             self.diagnostics.push(
                 Diagnostic::error(name.span, format!("`{}` cannot be a name", name.value))
@@ -329,8 +327,7 @@ impl Reader<'_> {
                 if key.value == "doc" {
                     doc = self.text(value).map(|t| t.value).unwrap_or_default();
                 } else {
-                    self.diagnostics
-                        .push(Diagnostic::error(key.span, format!("an input has no `{}`", key.value)).label("expected `doc`"));
+                    self.diagnostics.push(Diagnostic::error(key.span, format!("an input has no `{}`", key.value)).label("expected `doc`"));
                 }
             }
             inputs.push(Input { name, kind: *kind, doc });
@@ -361,8 +358,10 @@ impl Reader<'_> {
                 return None;
             }
             _ => {
-                self.diagnostics
-                    .push(Diagnostic::error(value.span, format!("`{}` is no node", name.value)).label("expected such as `Exposure(image: \"in\", ev: 1)`"));
+                self.diagnostics.push(
+                    Diagnostic::error(value.span, format!("`{}` is no node", name.value))
+                        .label("expected such as `Exposure(image: \"in\", ev: 1)`"),
+                );
                 return None;
             }
         };

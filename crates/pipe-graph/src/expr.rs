@@ -255,9 +255,9 @@ impl Expr {
             Kind::Number(v) => wgsl_number(*v),
             Kind::Name(name) => match resolve(name) {
                 Some(text) => text,
-                None => constant(name)
-                    .map(wgsl_number)
-                    .ok_or_else(|| ExprError::new(self.range.clone(), format!("unknown name `{name}`")))?,
+                None => {
+                    constant(name).map(wgsl_number).ok_or_else(|| ExprError::new(self.range.clone(), format!("unknown name `{name}`")))?
+                }
             },
             Kind::Negate(e) => format!("(-{})", e.to_wgsl(resolve)?),
             Kind::Not(e) => format!("select(0.0, 1.0, {} == 0.0)", e.to_wgsl(resolve)?),

@@ -14,8 +14,8 @@ use indexmap::IndexMap;
 use crate::field::{Accepts, Driven, EdgeIndex, Image, In, Mesh};
 use crate::node::{Mistake, as_image};
 use crate::pass::{
-    Access, Border, Constant, Count, Entry, Filter, Grid, Item, Limits, Loop, NodeLabel, Origin, Pass, PassGraph, Read, Reach,
-    Resource, ResourceId, Shader, Shape, State, Value, Write,
+    Access, Border, Constant, Count, Entry, Filter, Grid, Item, Limits, Loop, NodeLabel, Origin, Pass, PassGraph, Reach, Read, Resource,
+    ResourceId, Shader, Shape, State, Value, Write,
 };
 use crate::types::{EdgeType, ImageType};
 

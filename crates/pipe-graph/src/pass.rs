@@ -58,9 +58,7 @@ impl Shape {
     pub const fn bytes(&self) -> u64 {
         match self {
             Self::Image(t) => t.size[0] as u64 * t.size[1] as u64 * t.channels as u64 * t.precision.bytes(),
-            Self::Volume(t) => {
-                t.size[0] as u64 * t.size[1] as u64 * t.size[2] as u64 * t.channels as u64 * t.precision.bytes()
-            }
+            Self::Volume(t) => t.size[0] as u64 * t.size[1] as u64 * t.size[2] as u64 * t.channels as u64 * t.precision.bytes(),
             Self::Table { len, .. } | Self::Words { len } => *len as u64 * 4,
             Self::Scalar => 16,
         }

@@ -121,9 +121,7 @@ impl Block {
     pub fn load(&self, at: [i64; 3], border: Border) -> [f64; 4] {
         let index: [_; 3] = std::array::from_fn(|i| border_index(at[i], self.size[i], border));
         match index {
-            [Some(x), Some(y), Some(z)] => {
-                self.voxels[(z * self.size[1] as usize + y) * self.size[0] as usize + x]
-            }
+            [Some(x), Some(y), Some(z)] => self.voxels[(z * self.size[1] as usize + y) * self.size[0] as usize + x],
             _ => [0.0; 4],
         }
     }

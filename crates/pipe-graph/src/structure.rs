@@ -67,4 +67,3 @@ pub struct Feedback {
     #[schemars(range(min = 1, max = 64), extend("x-unit" = "frames"))]
     pub delay: u32,
 }
-

@@ -214,7 +214,8 @@ mod tests {
 
     #[test]
     fn every_part_has_its_place() {
-        let text = "Graph(\n  // a comment\n  nodes: { \"a\": Blur(image: \"in\", sigma: 2.5), }, on: true, list: [1, -2.0], t: (1, 2), k: Auto)";
+        let text =
+            "Graph(\n  // a comment\n  nodes: { \"a\": Blur(image: \"in\", sigma: 2.5), }, on: true, list: [1, -2.0], t: (1, 2), k: Auto)";
         let tree = parse(text);
         let Syntax::Struct(Some(head), fields) = &tree.value else { panic!("{tree:?}") };
         assert_eq!(head.value, "Graph");

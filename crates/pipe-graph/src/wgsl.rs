@@ -115,7 +115,12 @@ fn explain(path: &str, text: &str, message: &str, place: Option<std::ops::Range<
     let number = text[..line_start].matches('\n').count() + 1;
     let column = text[line_start..place.start].chars().count() + 1;
     let width = text.get(place.start..place.end.min(line_start + line.len())).map_or(1, |t| t.chars().count()).max(1);
-    format!("{path}:{number}:{column}: {message}\n  {number} | {line}\n  {} | {}{}", " ".repeat(number.to_string().len()), " ".repeat(column - 1), "^".repeat(width))
+    format!(
+        "{path}:{number}:{column}: {message}\n  {number} | {line}\n  {} | {}{}",
+        " ".repeat(number.to_string().len()),
+        " ".repeat(column - 1),
+        "^".repeat(width)
+    )
 }
 
 /// The text with every `import …;` overwritten by spaces, so that places stay.

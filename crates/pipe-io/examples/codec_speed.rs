@@ -7,10 +7,7 @@
 
 use std::time::{Duration, Instant};
 
-use pipe_io::{
-    Channels, Compression, Format, Input, Metadata, ReadOptions, Sample, Source, Target, WriteOptions, encode,
-    output_form,
-};
+use pipe_io::{Channels, Compression, Format, Input, Metadata, ReadOptions, Sample, Source, Target, WriteOptions, encode, output_form};
 
 fn main() {
     let mut arguments = std::env::args().skip(1).map(|word| word.parse::<u32>().unwrap());
@@ -33,12 +30,10 @@ fn main() {
         (Format::Hdr, Sample::F32, Channels::Rgb, None),
         (Format::Pfm, Sample::F32, Channels::Rgb, None),
     ] {
-        let options =
-            WriteOptions { pixel_type: Some(sample), channels: Some(channels), compression, ..WriteOptions::default() };
+        let options = WriteOptions { pixel_type: Some(sample), channels: Some(channels), compression, ..WriteOptions::default() };
         let target = Target { path: None, format };
         let form = output_form(&target, &options, None).unwrap();
-        let picture =
-            form.picture(width, height, pixels(width, height, channels, sample, form.layout), Metadata::default());
+        let picture = form.picture(width, height, pixels(width, height, channels, sample, form.layout), Metadata::default());
         let (write, bytes) = best(|| encode(&target, &picture, &options).unwrap());
         let input = Input::from_bytes(&Source::file("memory"), bytes.clone(), &ReadOptions::default()).unwrap();
         let (read, _) = best(|| input.read().unwrap());

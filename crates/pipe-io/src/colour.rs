@@ -34,11 +34,9 @@ impl Primaries {
     /// Display P3 (SMPTE RP 431-2 primaries, D65 white).
     pub const P3: Self = Self { red: [0.680, 0.320], green: [0.265, 0.690], blue: [0.150, 0.060], white: D65 };
     /// ACEScg, also called AP1 (S-2014-004).
-    pub const ACESCG: Self =
-        Self { red: [0.713, 0.293], green: [0.165, 0.830], blue: [0.128, 0.044], white: ACES_WHITE };
+    pub const ACESCG: Self = Self { red: [0.713, 0.293], green: [0.165, 0.830], blue: [0.128, 0.044], white: ACES_WHITE };
     /// ACES2065-1, also called AP0 (ST 2065-1).
-    pub const ACES2065_1: Self =
-        Self { red: [0.7347, 0.2653], green: [0.0, 1.0], blue: [0.0001, -0.077], white: ACES_WHITE };
+    pub const ACES2065_1: Self = Self { red: [0.7347, 0.2653], green: [0.0, 1.0], blue: [0.0001, -0.077], white: ACES_WHITE };
     /// CIE XYZ as an RGB space, white at equal energy.
     pub const XYZ: Self = Self { red: [1.0, 0.0], green: [0.0, 1.0], blue: [0.0, 0.0], white: [1.0 / 3.0, 1.0 / 3.0] };
 
@@ -58,10 +56,7 @@ impl Primaries {
     /// Whether all chromaticities agree within `tolerance`.
     pub fn near(&self, other: &Self, tolerance: f64) -> bool {
         let close = |a: [f64; 2], b: [f64; 2]| (a[0] - b[0]).abs() <= tolerance && (a[1] - b[1]).abs() <= tolerance;
-        close(self.red, other.red)
-            && close(self.green, other.green)
-            && close(self.blue, other.blue)
-            && close(self.white, other.white)
+        close(self.red, other.red) && close(self.green, other.green) && close(self.blue, other.blue) && close(self.white, other.white)
     }
 
     /// These primaries, or the named ones that they are a rounding of, so that f32 chromaticities of a file compare
@@ -235,8 +230,7 @@ fn inverse(m: &Matrix) -> Option<Matrix> {
         m[a][c] * m[b][d] - m[a][d] * m[b][c]
     };
     let determinant = m[0][0] * cofactor(0, 0) + m[0][1] * cofactor(0, 1) + m[0][2] * cofactor(0, 2);
-    (determinant.is_finite() && determinant.abs() > 1e-12)
-        .then(|| [0, 1, 2].map(|i| [0, 1, 2].map(|j| cofactor(j, i) / determinant)))
+    (determinant.is_finite() && determinant.abs() > 1e-12).then(|| [0, 1, 2].map(|i| [0, 1, 2].map(|j| cofactor(j, i) / determinant)))
 }
 
 fn narrow(m: Matrix) -> [[f32; 3]; 3] {
@@ -265,11 +259,7 @@ mod tests {
     #[test]
     fn acescg_to_rec709_is_the_published_matrix() {
         // The ACES distribution's AP1 → Rec.709 with Bradford adaptation.
-        let want = [
-            [1.705_051, -0.621_792, -0.083_258],
-            [-0.130_257, 1.140_804, -0.010_548],
-            [-0.024_003, -0.128_969, 1.152_972],
-        ];
+        let want = [[1.705_051, -0.621_792, -0.083_258], [-0.130_257, 1.140_804, -0.010_548], [-0.024_003, -0.128_969, 1.152_972]];
         let acescg = Colour { primaries: Primaries::ACESCG, transfer: Transfer::Linear };
         near(acescg.to_working_matrix(), want, 2e-5);
     }

@@ -36,9 +36,7 @@ pub enum Error {
         advice: &'static str,
     },
     /// The first bytes belong to no format this crate reads.
-    #[error(
-        "`{file}` is no image this program knows: its first bytes match none of {known}; convert it to one of these"
-    )]
+    #[error("`{file}` is no image this program knows: its first bytes match none of {known}; convert it to one of these")]
     UnknownFormat {
         /// The file as the user named it.
         file: String,
@@ -121,9 +119,7 @@ impl Error {
     pub(crate) fn write(file: impl fmt::Display, source: io::Error) -> Self {
         let advice = match source.kind() {
             io::ErrorKind::NotFound => "create its folder first",
-            io::ErrorKind::PermissionDenied | io::ErrorKind::ReadOnlyFilesystem => {
-                "choose a folder in which you may create files"
-            }
+            io::ErrorKind::PermissionDenied | io::ErrorKind::ReadOnlyFilesystem => "choose a folder in which you may create files",
             io::ErrorKind::StorageFull | io::ErrorKind::QuotaExceeded => "free some space",
             io::ErrorKind::IsADirectory => "name a file, not a folder",
             _ => "an earlier file of that name is untouched",

@@ -94,18 +94,9 @@ impl Compression {
     /// What a format can be compressed with, its default first; empty where there is no choice.
     pub const fn of(format: Format) -> &'static [Self] {
         match format {
-            Format::Exr => &[
-                Self::Zip,
-                Self::None,
-                Self::Rle,
-                Self::Zips,
-                Self::Piz,
-                Self::Pxr24,
-                Self::B44,
-                Self::B44a,
-                Self::Dwaa,
-                Self::Dwab,
-            ],
+            Format::Exr => {
+                &[Self::Zip, Self::None, Self::Rle, Self::Zips, Self::Piz, Self::Pxr24, Self::B44, Self::B44a, Self::Dwaa, Self::Dwab]
+            }
             Format::Png => &[Self::Fastest, Self::Balanced, Self::Best],
             Format::Tiff => &[Self::None, Self::Lzw, Self::Deflate, Self::Packbits],
             _ => &[],

@@ -63,9 +63,7 @@ impl Input {
             Format::Exr => exr::decode(bytes, layer, limits),
             Format::Png => png::decode(bytes, limits, profiles),
             Format::Tiff => tiff::decode(bytes, limits, profiles),
-            Format::Jpeg | Format::WebP | Format::Hdr | Format::Qoi => {
-                raster::decode(self.format, bytes, limits, profiles)
-            }
+            Format::Jpeg | Format::WebP | Format::Hdr | Format::Qoi => raster::decode(self.format, bytes, limits, profiles),
             Format::Pfm => plain::pfm_decode(bytes, limits),
             Format::Npy => plain::npy_decode(bytes, limits),
         });
@@ -84,9 +82,7 @@ impl Input {
             Format::Exr => exr::header(bytes, length, layer, limits),
             Format::Png => png::header(bytes, limits, profiles),
             Format::Tiff => tiff::header(bytes, limits, profiles),
-            Format::Jpeg | Format::WebP | Format::Hdr | Format::Qoi => {
-                raster::header(self.format, bytes, limits, profiles)
-            }
+            Format::Jpeg | Format::WebP | Format::Hdr | Format::Qoi => raster::header(self.format, bytes, limits, profiles),
             Format::Pfm => plain::pfm_header(bytes, limits),
             Format::Npy => plain::npy_header(bytes, limits),
         });

@@ -63,17 +63,15 @@ impl<'a> Array<'a> {
         let text = bytes.get(start..end).ok_or_else(short)?;
         let text = std::str::from_utf8(text).map_err(|_| Fault::damaged("its header is no text"))?;
 
-        let code = value_of(text, "descr").and_then(quoted).ok_or_else(|| {
-            Fault::unsupported("an array of records; save one plain array of u1, u2, u4, i4, f2, f4 or f8")
-        })?;
+        let code = value_of(text, "descr")
+            .and_then(quoted)
+            .ok_or_else(|| Fault::unsupported("an array of records; save one plain array of u1, u2, u4, i4, f2, f4 or f8"))?;
         let all = [Element::U8, Element::U16, Element::U32, Element::I32, Element::F16, Element::F32, Element::F64];
         let (order, code_only) = code.split_at_checked(1).unwrap_or(("", ""));
         let element = all
             .into_iter()
             .find(|element| element.code() == code_only && matches!(order, "<" | ">" | "|" | "="))
-            .ok_or_else(|| {
-                Fault::unsupported(format!("elements of type `{code}`; use u1, u2, u4, i4, f2, f4 or f8"))
-            })?;
+            .ok_or_else(|| Fault::unsupported(format!("elements of type `{code}`; use u1, u2, u4, i4, f2, f4 or f8")))?;
         let fortran = value_of(text, "fortran_order").ok_or_else(|| Fault::damaged("it has no `fortran_order`"))?;
         if fortran.starts_with("True") {
             return Err(Fault::unsupported("Fortran order; save it with numpy.ascontiguousarray"));
@@ -97,9 +95,7 @@ impl<'a> Array<'a> {
     pub(crate) fn native(&self) -> Result<Vec<u8>, Fault> {
         let size = self.element.bytes();
         let wanted = self.count().and_then(|count| count.checked_mul(size));
-        let data = wanted
-            .and_then(|wanted| self.rest.get(..wanted))
-            .ok_or_else(|| Fault::damaged("it is shorter than its shape says"))?;
+        let data = wanted.and_then(|wanted| self.rest.get(..wanted)).ok_or_else(|| Fault::damaged("it is shorter than its shape says"))?;
         let mut data = data.to_vec();
         if self.big_endian != cfg!(target_endian = "big") {
             data.chunks_exact_mut(size).for_each(<[u8]>::reverse);

@@ -69,10 +69,8 @@ pub(crate) fn pfm_decode(bytes: &[u8], limits: &Limits) -> Result<Picture, Fault
 }
 
 pub(crate) fn pfm_encode(out: &mut dyn Write, picture: &Picture) -> Result<(), Fault> {
-    let (kind, scale) = (
-        if picture.channels == Channels::Y { "Pf" } else { "PF" },
-        if cfg!(target_endian = "big") { "1.0" } else { "-1.0" },
-    );
+    let (kind, scale) =
+        (if picture.channels == Channels::Y { "Pf" } else { "PF" }, if cfg!(target_endian = "big") { "1.0" } else { "-1.0" });
     let row = picture.width as usize * picture.channels.count() * 4;
     write!(out, "{kind}\n{} {}\n{scale}\n", picture.width, picture.height).map_err(Fault::Io)?;
     picture.bytes.chunks_exact(row).rev().try_for_each(|line| out.write_all(line)).map_err(Fault::Io)

@@ -85,8 +85,7 @@ fn colour(info: &png::Info<'_>) -> Colour {
     };
     let primaries = info.chrm_chunk.map_or(Primaries::REC709, |xy| {
         let point = |(x, y): (png::ScaledFloat, png::ScaledFloat)| [x, y].map(|value| f64::from(value.into_value()));
-        let primaries =
-            Primaries { red: point(xy.red), green: point(xy.green), blue: point(xy.blue), white: point(xy.white) };
+        let primaries = Primaries { red: point(xy.red), green: point(xy.green), blue: point(xy.blue), white: point(xy.white) };
         if primaries.to_xyz().is_some() { primaries.snapped() } else { Primaries::REC709 }
     });
     Colour { primaries, transfer }
@@ -110,12 +109,7 @@ fn cicp(info: &png::Info<'_>) -> Option<Colour> {
     Some(Colour { primaries, transfer })
 }
 
-pub(crate) fn encode(
-    out: &mut dyn Write,
-    picture: &Picture,
-    compression: Compression,
-    tag_colour: bool,
-) -> Result<(), Fault> {
+pub(crate) fn encode(out: &mut dyn Write, picture: &Picture, compression: Compression, tag_colour: bool) -> Result<(), Fault> {
     let mut encoder = png::Encoder::new(out, picture.width, picture.height);
     encoder.set_color(match picture.channels {
         Channels::Y => png::ColorType::Grayscale,

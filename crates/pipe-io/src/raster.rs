@@ -141,10 +141,7 @@ fn hdr_bytes(bytes: &[u8]) -> impl std::io::Read + '_ {
 
 /// Whether turning the picture upright exchanges its width and its height.
 pub(crate) const fn swaps_sides(orientation: Orientation) -> bool {
-    matches!(
-        orientation,
-        Orientation::Rotate90 | Orientation::Rotate270 | Orientation::Rotate90FlipH | Orientation::Rotate270FlipH
-    )
+    matches!(orientation, Orientation::Rotate90 | Orientation::Rotate270 | Orientation::Rotate90FlipH | Orientation::Rotate270FlipH)
 }
 
 /// The orientation that an Exif or TIFF tag asks for, if it asks for any.
@@ -183,12 +180,7 @@ pub(crate) fn orient(picture: Picture, orientation: Orientation) -> Picture {
 }
 
 /// Writes an 8-bit picture (f32 for HDR) in the form that was asked for.
-pub(crate) fn encode(
-    format: Format,
-    out: &mut (impl Write + Seek),
-    picture: &Picture,
-    quality: u8,
-) -> Result<(), Fault> {
+pub(crate) fn encode(format: Format, out: &mut (impl Write + Seek), picture: &Picture, quality: u8) -> Result<(), Fault> {
     let (width, height) = (picture.width, picture.height);
     let kind = match (picture.channels, picture.sample) {
         (Channels::Y, Sample::U8) => ExtendedColorType::L8,
@@ -203,8 +195,7 @@ pub(crate) fn encode(
         Format::WebP => WebPEncoder::new_lossless(out).write_image(&picture.bytes, width, height, kind),
         Format::Hdr => HdrEncoder::new(out).write_image(&representable(&picture.bytes), width, height, kind),
         _ => {
-            let mut encoder =
-                qoi::Encoder::new(&picture.bytes, width, height).map_err(|error| Fault::Form(error.to_string()))?;
+            let mut encoder = qoi::Encoder::new(&picture.bytes, width, height).map_err(|error| Fault::Form(error.to_string()))?;
             if picture.colour == Colour::LINEAR_REC709 {
                 encoder = encoder.with_colorspace(qoi::ColorSpace::Linear);
             }

@@ -37,8 +37,7 @@ pub enum Format {
 
 impl Format {
     /// Every format.
-    pub const ALL: [Self; 9] =
-        [Self::Exr, Self::Png, Self::Jpeg, Self::Tiff, Self::Hdr, Self::Pfm, Self::WebP, Self::Qoi, Self::Npy];
+    pub const ALL: [Self; 9] = [Self::Exr, Self::Png, Self::Jpeg, Self::Tiff, Self::Hdr, Self::Pfm, Self::WebP, Self::Qoi, Self::Npy];
 
     /// The format's own name.
     pub const fn name(self) -> &'static str {

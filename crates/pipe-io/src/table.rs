@@ -144,9 +144,7 @@ fn read_npy(array: &Array<'_>) -> std::result::Result<Table, crate::error::Fault
     let words = bytes.as_chunks::<4>().0.iter().copied();
     Ok(match array.element {
         Element::U8 => Table::Uint(bytes.iter().copied().map(u32::from).collect()),
-        Element::U16 => {
-            Table::Uint(bytes.as_chunks::<2>().0.iter().map(|&two| u16::from_ne_bytes(two).into()).collect())
-        }
+        Element::U16 => Table::Uint(bytes.as_chunks::<2>().0.iter().map(|&two| u16::from_ne_bytes(two).into()).collect()),
         Element::U32 => Table::Uint(words.map(u32::from_ne_bytes).collect()),
         Element::I32 => Table::Float(words.map(|four| i32::from_ne_bytes(four) as f32).collect()),
         Element::F16 => {

@@ -78,12 +78,7 @@ fn open<'a>(bytes: &'a [u8], limits: &Limits) -> Result<Opened<'a>, Fault> {
         colour: if sample.is_float() { Colour::LINEAR_REC709 } else { Colour::SRGB },
         channel_names: Vec::new(),
         layers: Vec::new(),
-        metadata: Metadata {
-            sample: Some(sample),
-            compression: Some(compression),
-            had_alpha: channels.has_alpha(),
-            ..Metadata::default()
-        },
+        metadata: Metadata { sample: Some(sample), compression: Some(compression), had_alpha: channels.has_alpha(), ..Metadata::default() },
     };
     Ok(Opened { decoder, header, kind, layout, profile, orientation })
 }

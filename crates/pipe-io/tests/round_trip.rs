@@ -3,8 +3,8 @@
 #![allow(clippy::unwrap_used)] // a test may stop where it stands
 
 use pipe_io::{
-    Alpha, Channels, Colorspace, Colour, Compression, Format, Input, Layout, Metadata, Picture, ReadOptions, Sample,
-    Source, Target, Transfer, WriteOptions, encode, output_form, write,
+    Alpha, Channels, Colorspace, Colour, Compression, Format, Input, Layout, Metadata, Picture, ReadOptions, Sample, Source, Target,
+    Transfer, WriteOptions, encode, output_form, write,
 };
 
 const WIDTH: u32 = 61;

@@ -59,7 +59,8 @@ fn type_of(property: &Value, root: &Value) -> String {
     }
     for key in ["oneOf", "anyOf"] {
         if let Some(choices) = property.get(key).and_then(Value::as_array) {
-            let mut names: Vec<String> = choices.iter().filter(|c| c.get("type").is_none_or(|t| t != "null")).map(|c| type_of(c, root)).collect();
+            let mut names: Vec<String> =
+                choices.iter().filter(|c| c.get("type").is_none_or(|t| t != "null")).map(|c| type_of(c, root)).collect();
             names.dedup();
             return names.join(" | ");
         }

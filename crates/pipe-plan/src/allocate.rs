@@ -208,9 +208,7 @@ fn storage(shape: Shape, limits: &Limits) -> Storage {
             }
             Storage::Volume(t)
         }
-        Shape::Table { .. } | Shape::Words { .. } | Shape::Scalar => {
-            Storage::Buffer { bytes: shape.bytes().next_multiple_of(16).max(16) }
-        }
+        Shape::Table { .. } | Shape::Words { .. } | Shape::Scalar => Storage::Buffer { bytes: shape.bytes().next_multiple_of(16).max(16) },
     }
 }
 
@@ -583,7 +581,9 @@ impl Writer<'_> {
             odd,
             even,
             count: match (r.count, r.until) {
-                (Count::Until { limit, every, max, .. }, Some(value)) => Times::Until { value: [slot(&value[0]), slot(&value[1])], limit, every, max },
+                (Count::Until { limit, every, max, .. }, Some(value)) => {
+                    Times::Until { value: [slot(&value[0]), slot(&value[1])], limit, every, max }
+                }
                 (Count::Fixed(n) | Count::Until { max: n, .. }, _) => Times::Fixed(n),
             },
             settle: r.settle.iter().map(|(from, to)| (slot(from), slot(to))).collect(),

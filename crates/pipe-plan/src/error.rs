@@ -25,7 +25,9 @@ pub enum PlanError {
     /// The plan does not fit the budget.
     #[error(
         "the plan needs {} at once, the budget is {}; the largest part is `{name}` with {}\n  next: give it more with --vram, shrink the image, or use options: (format: F16)",
-        mib(needed), mib(budget), mib(bytes)
+        mib(needed),
+        mib(budget),
+        mib(bytes)
     )]
     Budget { needed: u64, budget: u64, alive: usize, name: String, bytes: u64 },
     /// A node refused to be lowered.

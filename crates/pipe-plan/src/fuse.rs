@@ -89,7 +89,11 @@ fn share_equal(list: Vec<Op>, outside: &BTreeSet<ResourceId>, log: &mut Vec<Stri
 
 fn same_work(a: &KernelPass, b: &KernelPass) -> bool {
     let ports = |p: &KernelPass| -> Vec<(String, Access)> { p.writes.iter().map(|w| (w.port.clone(), w.access)).collect() };
-    a.stages == b.stages && a.reads == b.reads && a.grid == b.grid && ports(a) == ports(b) && b.writes.iter().all(|w| w.in_place_of.is_none())
+    a.stages == b.stages
+        && a.reads == b.reads
+        && a.grid == b.grid
+        && ports(a) == ports(b)
+        && b.writes.iter().all(|w| w.in_place_of.is_none())
 }
 
 fn rename(op: &mut Op, names: &BTreeMap<ResourceId, ResourceId>) {
@@ -222,7 +226,9 @@ impl Fusion<'_> {
                 if !(feeds || shares) || first.stages.len() + second.stages.len() > MOST_STAGES {
                     continue;
                 }
-                let half = |p: &KernelPass| p.writes.iter().any(|w| matches!(self.ops.shape(w.resource), Shape::Image(t) if t.precision == Precision::F16));
+                let half = |p: &KernelPass| {
+                    p.writes.iter().any(|w| matches!(self.ops.shape(w.resource), Shape::Image(t) if t.precision == Precision::F16))
+                };
                 if feeds && half(first) {
                     continue;
                 }
@@ -358,10 +364,16 @@ fn stack(first: &KernelPass, second: &KernelPass) -> KernelPass {
 
 /// Takes reads away that no port loads any more.
 fn drop_unread(pass: &mut KernelPass) {
-    let used: Vec<bool> = (0..pass.reads.len())
-        .map(|r| pass.stages.iter().flat_map(|s| &s.ports).any(|p| p.source == Source::Read(r)))
+    let used: Vec<bool> =
+        (0..pass.reads.len()).map(|r| pass.stages.iter().flat_map(|s| &s.ports).any(|p| p.source == Source::Read(r))).collect();
+    let place: Vec<usize> = used
+        .iter()
+        .scan(0, |n, u| {
+            let at = *n;
+            *n += usize::from(*u);
+            Some(at)
+        })
         .collect();
-    let place: Vec<usize> = used.iter().scan(0, |n, u| { let at = *n; *n += usize::from(*u); Some(at) }).collect();
     for port in pass.stages.iter_mut().flat_map(|s| &mut s.ports) {
         if let Source::Read(r) = &mut port.source {
             *r = place[*r];
@@ -381,6 +393,7 @@ fn within_limits(pass: &KernelPass, ops: &Ops, limits: &Limits) -> bool {
     let mut buffers: Vec<ResourceId> = pass.drivers().collect();
     buffers.sort_unstable();
     buffers.dedup();
-    let buffers = buffers.len() as u32 + count(&mut pass.reads.iter().copied(), false) + count(&mut pass.writes.iter().map(|w| w.resource), false);
+    let buffers =
+        buffers.len() as u32 + count(&mut pass.reads.iter().copied(), false) + count(&mut pass.writes.iter().map(|w| w.resource), false);
     sampled <= limits.max_sampled_images && stored <= limits.max_storage_images && buffers <= limits.max_storage_buffers
 }

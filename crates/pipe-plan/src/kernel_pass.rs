@@ -6,8 +6,8 @@
 
 use indexmap::IndexMap;
 use pipe_graph::pass::{
-    Access, Border, Constant, Count, Entry, Filter, Grid, Item, NodeLabel, Pass, PassGraph, Reach, Resource, ResourceId, Shader,
-    Shape, State, Value,
+    Access, Border, Constant, Count, Entry, Filter, Grid, Item, NodeLabel, Pass, PassGraph, Reach, Resource, ResourceId, Shader, Shape,
+    State, Value,
 };
 
 /// Where a port's values come from.

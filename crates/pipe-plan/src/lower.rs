@@ -57,9 +57,10 @@ pub fn lower(graph: &Graph, rim: &Rim, limits: &Limits) -> Result<PassGraph, Pla
     }
     for (_, instance) in graph.iter() {
         if let Work::Feedback { next, .. } = instance.work
-            && let Carried::One(id) = values[&next] {
-                lowerer.passes.kept.push((instance.name.clone(), id));
-            }
+            && let Carried::One(id) = values[&next]
+        {
+            lowerer.passes.kept.push((instance.name.clone(), id));
+        }
     }
     lowerer.passes.items = std::mem::take(&mut lowerer.decoding);
     lowerer.passes.items.extend(items);
@@ -195,9 +196,8 @@ impl Lowerer<'_> {
         let mut cx = Lowering::new(&mut self.passes, &site);
         work.lower(&mut cx).map_err(|m| refused(&instance.name, &m))?;
         let (own, emitted) = cx.finish();
-        let port = |name: &str| {
-            emitted.get(name).copied().ok_or_else(|| refused(&instance.name, &Mistake::new(format!("makes no `{name}`"))))
-        };
+        let port =
+            |name: &str| emitted.get(name).copied().ok_or_else(|| refused(&instance.name, &Mistake::new(format!("makes no `{name}`"))));
         let mut out: Vec<Carried> = instance.outputs.iter().map(|o: &Output| port(&o.name)).collect::<Result<_, _>>()?;
         match carried {
             None => items.extend(own),

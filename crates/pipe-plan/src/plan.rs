@@ -38,9 +38,7 @@ impl Storage {
     pub const fn bytes(&self) -> u64 {
         match self {
             Self::Image(t) => t.size[0] as u64 * t.size[1] as u64 * t.channels as u64 * t.precision.bytes(),
-            Self::Volume(t) => {
-                t.size[0] as u64 * t.size[1] as u64 * t.size[2] as u64 * t.channels as u64 * t.precision.bytes()
-            }
+            Self::Volume(t) => t.size[0] as u64 * t.size[1] as u64 * t.size[2] as u64 * t.channels as u64 * t.precision.bytes(),
             Self::Buffer { bytes } => *bytes,
         }
     }

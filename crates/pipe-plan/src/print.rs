@@ -124,9 +124,7 @@ impl Plan {
             }
             pass
         };
-        let slot = |(id, s): (usize, &crate::plan::Slot)| {
-            json!({"id": id, "format": s.storage.format(), "size": s.storage.extent(), "bytes": s.storage.bytes()})
-        };
+        let slot = |(id, s): (usize, &crate::plan::Slot)| json!({"id": id, "format": s.storage.format(), "size": s.storage.extent(), "bytes": s.storage.bytes()});
         json!({
             "graph": self.name,
             "size": self.size(),
@@ -190,7 +188,8 @@ impl Plan {
                 extent.join("x"),
                 bytes(slot.storage.bytes())
             );
-            let uses: Vec<usize> = lines.iter().enumerate().filter(|(_, l)| l.run.slots.iter().any(|id| id.0 as usize == s)).map(|(i, _)| i).collect();
+            let uses: Vec<usize> =
+                lines.iter().enumerate().filter(|(_, l)| l.run.slots.iter().any(|id| id.0 as usize == s)).map(|(i, _)| i).collect();
             if let (Some(first), Some(last)) = (uses.first(), uses.last()) {
                 let x = LEFT + first * STEP;
                 let _ = writeln!(
@@ -200,7 +199,12 @@ impl Plan {
                     ROW - 4
                 );
                 for i in &uses {
-                    let _ = writeln!(out, "<rect x=\"{}\" y=\"{y}\" width=\"{STEP}\" height=\"{}\" fill=\"#3182bd\" fill-opacity=\"0.6\"/>", LEFT + i * STEP, ROW - 4);
+                    let _ = writeln!(
+                        out,
+                        "<rect x=\"{}\" y=\"{y}\" width=\"{STEP}\" height=\"{}\" fill=\"#3182bd\" fill-opacity=\"0.6\"/>",
+                        LEFT + i * STEP,
+                        ROW - 4
+                    );
                 }
             }
         }

@@ -68,12 +68,8 @@ struct Tracked {
 impl Problem {
     fn new(list: &[Op], ops: &Ops, outside: &BTreeSet<ResourceId>) -> Self {
         let mut tracked: BTreeMap<ResourceId, Tracked> = BTreeMap::new();
-        let entry = |id: ResourceId| Tracked {
-            bytes: ops.shape(id).bytes(),
-            writer: None,
-            readers: Vec::new(),
-            stays: outside.contains(&id),
-        };
+        let entry =
+            |id: ResourceId| Tracked { bytes: ops.shape(id).bytes(), writer: None, readers: Vec::new(), stays: outside.contains(&id) };
         for (i, op) in list.iter().enumerate() {
             for id in op.results() {
                 tracked.entry(id).or_insert_with(|| entry(id)).writer = Some(i);

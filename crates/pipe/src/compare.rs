@@ -144,7 +144,13 @@ fn flip(a: &Values, b: &Values) -> f64 {
             let colour = if v.channels < 3 { [p[0]; 3] } else { [p[0], p[1], p[2]] };
             rgb.extend(colour.map(|c| {
                 let c = if c.is_nan() { 0.0 } else { c.clamp(0.0, 1.0) };
-                let e = if v.srgb { c } else if c <= 0.003_130_8 { 12.92 * c } else { 1.055 * c.powf(1.0 / 2.4) - 0.055 };
+                let e = if v.srgb {
+                    c
+                } else if c <= 0.003_130_8 {
+                    12.92 * c
+                } else {
+                    1.055 * c.powf(1.0 / 2.4) - 0.055
+                };
                 (e * 255.0 + 0.5) as u8
             }));
         }

@@ -43,7 +43,9 @@ impl std::error::Error for Failure {}
 impl From<pipe_io::Error> for Failure {
     fn from(e: pipe_io::Error) -> Self {
         match e {
-            pipe_io::Error::Argument { .. } | pipe_io::Error::Form { .. } | pipe_io::Error::UnknownExtension { .. } => Self::Graph(e.to_string()),
+            pipe_io::Error::Argument { .. } | pipe_io::Error::Form { .. } | pipe_io::Error::UnknownExtension { .. } => {
+                Self::Graph(e.to_string())
+            }
             _ => Self::World(e.to_string()),
         }
     }

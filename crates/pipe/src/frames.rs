@@ -58,13 +58,18 @@ pub fn run_sequence(
 ) -> Result<Outcome, Failure> {
     let mut project = Project::open(&job.graph)?;
     let kinds = input_kinds(&mut project);
-    let remembers = project.document.as_ref().is_some_and(|d| d.nodes.iter().any(|c| c.kind.value == "Feedback" || c.kind.value == "Accumulate"));
+    let remembers =
+        project.document.as_ref().is_some_and(|d| d.nodes.iter().any(|c| c.kind.value == "Feedback" || c.kind.value == "Accumulate"));
     if remembers && sequence.resume {
-        return Err(Failure::Graph("a graph with Feedback cannot be resumed: each frame needs the one before\n  next: run it without --resume".into()));
+        return Err(Failure::Graph(
+            "a graph with Feedback cannot be resumed: each frame needs the one before\n  next: run it without --resume".into(),
+        ));
     }
     let outputs_vary = job.outputs.values().map(|f| Pattern::parse(f)).collect::<Result<Vec<_>, _>>()?;
     if sequence.frames.into_iter().count() > 1 && outputs_vary.iter().any(Option::is_none) {
-        return Err(Failure::Graph("every frame would be written to the same file\n  next: name outputs with `####`, such as out.####.exr".into()));
+        return Err(Failure::Graph(
+            "every frame would be written to the same file\n  next: name outputs with `####`, such as out.####.exr".into(),
+        ));
     }
     let frames: Vec<u32> = sequence.frames.into_iter().collect();
     let mut outcome = Outcome::default();
@@ -77,7 +82,8 @@ pub fn run_sequence(
             for frame in frames {
                 let read = || -> Result<(Job, Option<Inputs>), Failure> {
                     let job = at_frame(job, frame)?;
-                    let done = sequence.resume && !job.outputs.is_empty() && job.outputs.values().all(|f| std::path::Path::new(f).is_file());
+                    let done =
+                        sequence.resume && !job.outputs.is_empty() && job.outputs.values().all(|f| std::path::Path::new(f).is_file());
                     let inputs = if done { None } else { Some(decode(&job, kinds)?) };
                     Ok((job, inputs))
                 };

@@ -106,10 +106,15 @@ fn read_graph(name: &str) -> Result<(PathBuf, String), Failure> {
             Err(_) => Err(Failure::Graph(format!("{name} is no graph: it is not text"))),
         },
         Err(e) => match presets::text(name) {
-            Some(text) => Ok((PathBuf::from(if name.ends_with(".ron") { name.to_owned() } else { format!("{name}.ron") }), text.to_owned())),
+            Some(text) => {
+                Ok((PathBuf::from(if name.ends_with(".ron") { name.to_owned() } else { format!("{name}.ron") }), text.to_owned()))
+            }
             None => {
                 let near = pipe_graph::diagnostic::nearest(name, presets::names());
-                let hint = near.map_or_else(|| "`pipe presets` lists the graphs that come with the program".to_owned(), |n| format!("did you mean the preset `{n}`?"));
+                let hint = near.map_or_else(
+                    || "`pipe presets` lists the graphs that come with the program".to_owned(),
+                    |n| format!("did you mean the preset `{n}`?"),
+                );
                 Err(Failure::World(format!("cannot read the graph `{name}`: {e}\n  next: {hint}")))
             }
         },

@@ -446,9 +446,7 @@ fn rim(job: &Job, graph: &Graph, inputs: &Inputs, files: &Inputs) -> Result<(Rim
                 rim.outputs.insert(name.clone(), forms::of_form(&form, t.size));
                 Packed::Image { target, form, size: t.size }
             }
-            EdgeType::Table(_) | EdgeType::Scalar(_) => {
-                Packed::Data(ReadbackFile { path: file, element: None, channels: Vec::new(), ty })
-            }
+            EdgeType::Table(_) | EdgeType::Scalar(_) => Packed::Data(ReadbackFile { path: file, element: None, channels: Vec::new(), ty }),
             EdgeType::Volume(_) | EdgeType::Mesh(_) => {
                 return Err(Failure::Graph(format!("output `{name}` is {ty}, which cannot be written yet")));
             }
@@ -501,6 +499,8 @@ fn first_size(graph: &Graph) -> Vec<u32> {
 pub fn make_plan(graph: &Graph, rim: &Rim, limits: &Limits, job: &Job) -> Result<Plan, Failure> {
     let mut passes = lower(graph, rim, limits)?;
     // An output that no file is bound to is not computed.
-    passes.fetches.retain(|f| rim.outputs.contains_key(&f.name) || !graph.outputs().any(|(n, _)| n == f.name) || job.outputs.contains_key(&f.name));
+    passes
+        .fetches
+        .retain(|f| rim.outputs.contains_key(&f.name) || !graph.outputs().any(|(n, _)| n == f.name) || job.outputs.contains_key(&f.name));
     Ok(pipe_plan::plan(&graph.name, passes, limits, &Options { fuse: job.fuse, budget: job.budget })?)
 }

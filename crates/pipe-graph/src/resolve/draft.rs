@@ -113,9 +113,7 @@ impl Resolver<'_> {
         self.diagnostics.extend(mistakes);
         let fields = fields?;
         let Some(span) = file else {
-            self.diagnostics.push(
-                Diagnostic::error(call.span, "a Subgraph needs a file").label("expected `file: \"name.ron\"`"),
-            );
+            self.diagnostics.push(Diagnostic::error(call.span, "a Subgraph needs a file").label("expected `file: \"name.ron\"`"));
             return None;
         };
         let inputs = edge_of(&fields.inputs);
@@ -141,9 +139,8 @@ impl Resolver<'_> {
             missing("state", "state: {\"u\": \"seed\"}");
         }
         if fields.count.is_none() == fields.until.is_none() {
-            self.diagnostics.push(
-                Diagnostic::error(call.span, "Iterate takes either `count` or `until`").label("expected exactly one of the two"),
-            );
+            self.diagnostics
+                .push(Diagnostic::error(call.span, "Iterate takes either `count` or `until`").label("expected exactly one of the two"));
         }
         let (body, next) = (body?.1, next?.1);
         let mut reader = Reader { registry: self.registry, diagnostics: self.diagnostics };
@@ -173,13 +170,11 @@ impl Resolver<'_> {
             return None;
         }
         let Some(next) = next else {
-            self.diagnostics
-                .push(Diagnostic::error(call.span, "Feedback has no `next`").label("expected `next: \"node\"`"));
+            self.diagnostics.push(Diagnostic::error(call.span, "Feedback has no `next`").label("expected `next: \"node\"`"));
             return None;
         };
         if !fields.init.is_bound() {
-            self.diagnostics
-                .push(Diagnostic::error(call.span, "missing input `init`").label("expected `init: \"NAME\"`"));
+            self.diagnostics.push(Diagnostic::error(call.span, "missing input `init`").label("expected `init: \"NAME\"`"));
             return None;
         }
         Some((What::Feedback { next: Spanned { span: next, value: fields.next }, delay: fields.delay }, edges))

@@ -86,10 +86,8 @@ fn read_settings(settings: &[(String, String)], sources: &mut Sources) -> Vec<Se
     let read = |(name, text): &(String, String)| {
         let file = sources.add(Path::new("--set"), text);
         // A value that is no RON is taken as plain text, so that the shell needs no second pair of quotes.
-        let value = parse_tree(text, file).unwrap_or_else(|_| Tree {
-            span: Span::new(file, 0..text.len()),
-            value: crate::span::Syntax::Text(text.clone()),
-        });
+        let value = parse_tree(text, file)
+            .unwrap_or_else(|_| Tree { span: Span::new(file, 0..text.len()), value: crate::span::Syntax::Text(text.clone()) });
         Setting { name: name.clone(), value, used: false }
     };
     settings.iter().map(read).collect()

@@ -199,8 +199,11 @@ impl Resolver<'_> {
                 }
                 let names: Vec<_> = ports.iter().map(|(n, _)| n.as_str()).collect();
                 let d = match port {
-                    Some(port) => Diagnostic::error(span, format!("`{name}` has no port `{port}`"))
-                        .label(if names.is_empty() { "it has none".to_owned() } else { format!("its ports are {}", names.join(", ")) }),
+                    Some(port) => Diagnostic::error(span, format!("`{name}` has no port `{port}`")).label(if names.is_empty() {
+                        "it has none".to_owned()
+                    } else {
+                        format!("its ports are {}", names.join(", "))
+                    }),
                     None => Diagnostic::error(span, format!("`{name}` has no outputs")).label("nothing can be read from it"),
                 };
                 self.diagnostics.push(with_nearest(d, port.unwrap_or_default(), names));
@@ -228,9 +231,7 @@ impl Resolver<'_> {
         let (outer, around) = frame.outer?;
         Some(match self.find(level - 1, outer, around, name)? {
             Entity::Value(value) => Entity::Value(value.map(|v| self.capture(level, v))),
-            Entity::Node(ports) => {
-                Entity::Node(ports.map(|ports| ports.into_iter().map(|(n, v)| (n, self.capture(level, v))).collect()))
-            }
+            Entity::Node(ports) => Entity::Node(ports.map(|ports| ports.into_iter().map(|(n, v)| (n, self.capture(level, v))).collect())),
         })
     }
 
@@ -282,8 +283,11 @@ impl Resolver<'_> {
             return true;
         }
         let wanted: Vec<_> = edge.kinds.iter().map(|k| article(*k)).collect();
-        let mut d = Diagnostic::error(edge.span, format!("`{}` is {}, but `{}` takes {}", edge.text, article(ty.kind()), edge.field, wanted.join(" or ")))
-            .label(format!("expected {}", wanted.join(" or ")));
+        let mut d = Diagnostic::error(
+            edge.span,
+            format!("`{}` is {}, but `{}` takes {}", edge.text, article(ty.kind()), edge.field, wanted.join(" or ")),
+        )
+        .label(format!("expected {}", wanted.join(" or ")));
         if edge.kinds == [EdgeKind::Scalar] {
             d = d.hint("PyramidAverage and Stats make scalars of an image");
         }
@@ -377,7 +381,8 @@ impl Resolver<'_> {
         if self.chain.contains(&normal(&path)) {
             let chain: Vec<_> = self.chain.iter().chain([&normal(&path)]).map(|p| p.display().to_string()).collect();
             self.diagnostics.push(
-                Diagnostic::error(file.span, format!("a subgraph that contains itself: {}", chain.join(" -> "))).label("this closes the circle"),
+                Diagnostic::error(file.span, format!("a subgraph that contains itself: {}", chain.join(" -> ")))
+                    .label("this closes the circle"),
             );
             return None;
         }
@@ -592,7 +597,9 @@ fn impossible(output: &Output) -> Option<Mistake> {
         EdgeType::Table(t) => t.len == 0,
         EdgeType::Scalar(_) | EdgeType::Mesh(_) => false,
     };
-    wrong.then(|| Mistake::new(format!("would make an {} as `{}`", output.ty, output.name)).hint("every size must be at least 1 and of this world"))
+    wrong.then(|| {
+        Mistake::new(format!("would make an {} as `{}`", output.ty, output.name)).hint("every size must be at least 1 and of this world")
+    })
 }
 
 /// Texts in an `Iterate` body that may name something outside it.

@@ -29,9 +29,7 @@ impl Attributes {
         layer.deep_image_state = None;
         layer.original_data_window = None;
         for other in [&mut image.other, &mut layer.other] {
-            other.retain(|name, _| {
-                !standard_names::ALL.contains(&name.as_slice()) && name.as_slice() != b"dwaCompressionLevel"
-            });
+            other.retain(|name, _| !standard_names::ALL.contains(&name.as_slice()) && name.as_slice() != b"dwaCompressionLevel");
         }
         Self { image, layer: Box::new(layer) }
     }

@@ -79,9 +79,7 @@ fn upsample(chroma: &[f32], width: usize, height: usize) -> Vec<f32> {
 
 /// The value halfway between samples `i` and `i + 1`; samples beyond the border repeat it.
 fn between(i: usize, count: usize, at: impl Fn(usize) -> f32) -> f32 {
-    let tap = |(distance, weight): (usize, &f32)| {
-        weight * (at(i.saturating_sub(distance)) + at((i + 1 + distance).min(count - 1)))
-    };
+    let tap = |(distance, weight): (usize, &f32)| weight * (at(i.saturating_sub(distance)) + at((i + 1 + distance).min(count - 1)));
     TAPS.iter().enumerate().map(tap).sum()
 }
 

@@ -22,13 +22,7 @@ use crate::picture::{Sample, Window};
 
 /// Reads `channels` (indices into the part's; `None` reads as zeros) as planes one after another. Each plane covers
 /// `view`, in the file's coordinates, divided by its channel's sampling; outside the data window it is zero.
-pub(super) fn read(
-    opened: &Opened,
-    bytes: &[u8],
-    channels: &[Option<usize>],
-    sample: Sample,
-    view: Window,
-) -> Result<Vec<u8>, Fault> {
+pub(super) fn read(opened: &Opened, bytes: &[u8], channels: &[Option<usize>], sample: Sample, view: Window) -> Result<Vec<u8>, Fault> {
     let part = opened.part();
     let planes: Vec<Plane> = channels.iter().map(|&index| Plane::new(part, index, sample, view)).collect();
     let total = planes.iter().map(Plane::bytes).sum();
@@ -39,9 +33,7 @@ pub(super) fn read(
     let grid = Grid::new(opened, part);
     let offsets = grid.offsets(opened, bytes)?;
     let bands = split(&grid, &planes, &mut pixels, opened.data, view);
-    bands
-        .into_par_iter()
-        .try_for_each(|band| shielded(|| band.decode(opened, bytes, &grid, &offsets, &planes, sample, view)))?;
+    bands.into_par_iter().try_for_each(|band| shielded(|| band.decode(opened, bytes, &grid, &offsets, &planes, sample, view)))?;
     Ok(pixels)
 }
 
@@ -314,24 +306,16 @@ fn decompress_subsampled(part: &Part, chunk: Chunk, width: usize, ys: Range<usiz
         return Err(Fault::damaged("its tiles have subsampled channels, which EXR forbids"));
     };
     let list = &part.channels.list;
-    let size: usize =
-        ys.clone().flat_map(|y| list.iter().filter_map(move |channel| line_bytes(channel, width, y))).sum();
+    let size: usize = ys.clone().flat_map(|y| list.iter().filter_map(move |channel| line_bytes(channel, width, y))).sum();
     let height = ys.len();
-    let bytewise = matches!(
-        part.compression,
-        Compression::Uncompressed | Compression::RLE | Compression::ZIP1 | Compression::ZIP16
-    );
+    let bytewise = matches!(part.compression, Compression::Uncompressed | Compression::RLE | Compression::ZIP1 | Compression::ZIP16);
     let mut alone = part.clone();
     alone.own_attributes.layer_position = Vec2(0, 0);
     if bytewise {
-        alone.channels = exr::meta::attribute::ChannelList::new(
-            std::iter::once(ChannelDescription::named("Y", SampleType::F16)).collect(),
-        );
+        alone.channels = exr::meta::attribute::ChannelList::new(std::iter::once(ChannelDescription::named("Y", SampleType::F16)).collect());
         alone.layer_size = Vec2(size / 2, 1);
     } else {
-        let divisible = list
-            .iter()
-            .all(|channel| width.is_multiple_of(channel.sampling.0) && ys.start.is_multiple_of(channel.sampling.1));
+        let divisible = list.iter().all(|channel| width.is_multiple_of(channel.sampling.0) && ys.start.is_multiple_of(channel.sampling.1));
         if !divisible || !size.is_multiple_of(width * height) {
             return Err(Fault::unsupported("chroma subsampling of this kind; save it as RGB"));
         }
@@ -341,7 +325,5 @@ fn decompress_subsampled(part: &Part, chunk: Chunk, width: usize, ys: Range<usiz
     alone.chunk_count = 1;
     let header = alone.clone();
     let area = exr::prelude::IntegerBounds { position: Vec2(0, 0), size: header.layer_size };
-    (header.compression)
-        .decompress_image_section_from_le(&alone, block.compressed_pixels_le, area, false)
-        .map_err(fault)
+    (header.compression).decompress_image_section_from_le(&alone, block.compressed_pixels_le, area, false).map_err(fault)
 }

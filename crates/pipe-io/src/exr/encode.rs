@@ -57,12 +57,7 @@ const fn method(compression: Compression) -> Method {
 }
 
 /// Writes a planar half or float picture. `tag_colour` is false for `raw` values, which get no chromaticities.
-pub(crate) fn encode(
-    out: &mut dyn Write,
-    picture: &Picture,
-    compression: Compression,
-    tag_colour: bool,
-) -> Result<(), Fault> {
+pub(crate) fn encode(out: &mut dyn Write, picture: &Picture, compression: Compression, tag_colour: bool) -> Result<(), Fault> {
     let sample_type = match (picture.sample, picture.layout) {
         (Sample::F16, Layout::Planar) => SampleType::F16,
         (Sample::F32, Layout::Planar) => SampleType::F32,
@@ -101,12 +96,8 @@ pub(crate) fn encode(
                     data.extend_from_slice(&picture.bytes[at..at + row_bytes]);
                 }
             }
-            let index = BlockIndex {
-                layer: 0,
-                pixel_position: Vec2(0, rows.start),
-                pixel_size: Vec2(width, rows.len()),
-                level: Vec2(0, 0),
-            };
+            let index =
+                BlockIndex { layer: 0, pixel_position: Vec2(0, rows.start), pixel_size: Vec2(width, rows.len()), level: Vec2(0, 0) };
             if cfg!(target_endian = "little") && matches!(compression, Compression::Zip | Compression::Zips) {
                 return Ok(zip(data));
             }

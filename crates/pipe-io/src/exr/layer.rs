@@ -177,8 +177,7 @@ fn pick(part: &Part, prefix: &str) -> (Meaning, Vec<Option<usize>>, Option<Strin
                     2 => (Meaning::Values, [others, vec![None]].concat()),
                     3 => (Meaning::Values, others),
                     _ => {
-                        let names: Vec<_> =
-                            members.iter().map(|(i, _)| part.channels.list[*i].name.to_string()).collect();
+                        let names: Vec<_> = members.iter().map(|(i, _)| part.channels.list[*i].name.to_string()).collect();
                         let names = names.join(", ");
                         let reason = format!("a layer of the channels {names}; choose one of them after a `#`");
                         return (Meaning::Values, others, Some(reason));

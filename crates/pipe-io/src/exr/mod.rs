@@ -183,8 +183,7 @@ impl Opened {
     fn primaries(&self) -> Primaries {
         let Some(xy) = self.part().shared_attributes.chromaticities else { return Primaries::REC709 };
         let wide = |v: exr::math::Vec2<f32>| [f64::from(v.0), f64::from(v.1)];
-        let primaries =
-            Primaries { red: wide(xy.red), green: wide(xy.green), blue: wide(xy.blue), white: wide(xy.white) };
+        let primaries = Primaries { red: wide(xy.red), green: wide(xy.green), blue: wide(xy.blue), white: wide(xy.white) };
         // A file with senseless chromaticities (all zero is common) is taken for the default, as OpenEXR does.
         if primaries.to_xyz().is_some() { primaries.snapped() } else { Primaries::REC709 }
     }
@@ -233,9 +232,7 @@ fn window(bounds: IntegerBounds) -> Result<Window, Fault> {
     let (x, y) = (bounds.position.0, bounds.position.1);
     match (size(bounds.size.0), size(bounds.size.1)) {
         // Far-off corners would overflow every later difference of coordinates.
-        (Some(width), Some(height)) if x.abs_diff(0) <= 1 << 29 && y.abs_diff(0) <= 1 << 29 => {
-            Ok(Window { x, y, width, height })
-        }
+        (Some(width), Some(height)) if x.abs_diff(0) <= 1 << 29 && y.abs_diff(0) <= 1 << 29 => Ok(Window { x, y, width, height }),
         _ => Err(Fault::damaged("its display or data window makes no sense")),
     }
 }
@@ -244,9 +241,7 @@ fn fault(error: exr::error::Error) -> Fault {
     match error {
         exr::error::Error::NotSupported(reason) => Fault::unsupported(reason),
         // The crate's word for an unexpected end.
-        exr::error::Error::Invalid(reason) if reason == "reference to missing bytes" => {
-            Fault::damaged("it ends too early")
-        }
+        exr::error::Error::Invalid(reason) if reason == "reference to missing bytes" => Fault::damaged("it ends too early"),
         exr::error::Error::Invalid(reason) if reason.contains("invalid") => Fault::Damaged(reason.into_owned()),
         exr::error::Error::Invalid(reason) => Fault::damaged(format!("invalid {reason}")),
         exr::error::Error::Io(_) => Fault::damaged("it ends too early"),

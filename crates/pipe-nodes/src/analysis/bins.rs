@@ -80,10 +80,7 @@ pub(crate) fn count(cx: &mut Lowering<'_>, suffix: &str, image: ResourceId, binn
 
 impl Binning {
     /// Constants and parameters of a pass that asks for bins of pixels.
-    pub(crate) fn describe<'b, 'a>(
-        &self,
-        pass: pipe_graph::lowering::PassBuilder<'b, 'a>,
-    ) -> pipe_graph::lowering::PassBuilder<'b, 'a> {
+    pub(crate) fn describe<'b, 'a>(&self, pass: pipe_graph::lowering::PassBuilder<'b, 'a>) -> pipe_graph::lowering::PassBuilder<'b, 'a> {
         pass.constant("BINS", self.bins as i32)
             .constant("CHANNEL", self.channel as i32)
             .constant("CLAMPED", self.outside == Outside::Clamp)
@@ -131,13 +128,7 @@ mod tests {
 
     #[test]
     fn bins_are_half_open_but_the_last() {
-        let mut binning = Binning {
-            bins: 4,
-            low: Value::F32(0.0),
-            high: Value::F32(1.0),
-            channel: Channel::R,
-            outside: Outside::Clamp,
-        };
+        let mut binning = Binning { bins: 4, low: Value::F32(0.0), high: Value::F32(1.0), channel: Channel::R, outside: Outside::Clamp };
         let bins = |b: &Binning| [-0.1, 0.0, 0.2499, 0.25, 0.75, 1.0, 1.5, f64::INFINITY, f64::NAN].map(|v| b.bin(v, 0.0, 1.0));
         assert_eq!(bins(&binning), [Some(0), Some(0), Some(0), Some(1), Some(3), Some(3), Some(3), Some(3), None]);
         binning.outside = Outside::Ignore;

@@ -75,10 +75,7 @@ impl Node for Compare {
     fn outputs(&self, inputs: &mut Inputs<'_>) -> Result<Vec<Output>, Mistake> {
         let joined = inputs.same_size(&[("a", &self.a), ("b", &self.b)])?;
         let channels = if self.by_channel() { joined.channels } else { 1 };
-        Ok(vec![
-            Output::new("out", EdgeType::scalar(1)),
-            Output::new("difference", EdgeType::image(joined.size, channels)),
-        ])
+        Ok(vec![Output::new("out", EdgeType::scalar(1)), Output::new("difference", EdgeType::image(joined.size, channels))])
     }
 
     fn lower(&self, cx: &mut Lowering<'_>) -> Result<(), Mistake> {

@@ -82,7 +82,10 @@ impl Taps {
         };
         let sensitivity = |b: f64| taps(colour_radius, &|x| (-PI * PI * (x / pixels_per_degree).powi(2) / b).exp());
         let sum = |w: &[f64]| w.iter().sum::<f64>();
-        let unit = |w: Vec<f64>| { let s = sum(&w); w.into_iter().map(|v| v / s).collect::<Vec<_>>() };
+        let unit = |w: Vec<f64>| {
+            let s = sum(&w);
+            w.into_iter().map(|v| v / s).collect::<Vec<_>>()
+        };
         let gaussians = BLUE_YELLOW.map(|(_, b)| sensitivity(b));
         let factors = BLUE_YELLOW.map(|(a, b)| a * (PI / b).sqrt());
         let whole: f64 = gaussians.iter().zip(factors).map(|(g, k)| k * sum(g).powi(2)).sum();

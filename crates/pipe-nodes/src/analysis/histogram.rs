@@ -113,13 +113,7 @@ impl Node for Histogram {
 
 impl Histogram {
     fn binning(&self) -> Binning {
-        Binning {
-            bins: self.bins,
-            low: self.range.0.into(),
-            high: self.range.1.into(),
-            channel: self.channel,
-            outside: self.outside,
-        }
+        Binning { bins: self.bins, low: self.range.0.into(), high: self.range.1.into(), channel: self.channel, outside: self.outside }
     }
 
     fn blend(&self, cx: &mut Lowering<'_>, image: ResourceId) -> ResourceId {

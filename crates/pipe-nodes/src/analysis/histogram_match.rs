@@ -75,11 +75,7 @@ impl Node for HistogramMatch {
         for (i, port) in ["red", "green", "blue"].into_iter().enumerate() {
             pass = pass.read(port, curves[i.min(curves.len() - 1)], Reach::Whole);
         }
-        pass.write("out", out)
-            .constant("BINS", self.bins as i32)
-            .param("low", self.range.0)
-            .param("high", self.range.1)
-            .add();
+        pass.write("out", out).constant("BINS", self.bins as i32).param("low", self.range.0).param("high", self.range.1).add();
         Ok(())
     }
 
@@ -90,7 +86,13 @@ impl Node for HistogramMatch {
         let cumulative = |of: &Raster, channel: Channel| {
             let mut sum = 0;
             let counts = self.binning(channel).count_reference(of, low, high);
-            counts.iter().map(|n| { sum += n; sum }).collect::<Vec<u64>>()
+            counts
+                .iter()
+                .map(|n| {
+                    sum += n;
+                    sum
+                })
+                .collect::<Vec<u64>>()
         };
         let curves: Vec<_> = channels.iter().map(|c| Curve { own: cumulative(image, *c), wanted: cumulative(reference, *c) }).collect();
         vec![Tensor::Image(image.map(image.channels, |c| {
@@ -132,7 +134,13 @@ impl Curve {
             return (bin + usize::from(upper)) as f64;
         }
         let below = |i: usize| if i == 0 { 0 } else { u128::from(self.wanted[i - 1]) };
-        let count = if upper { self.own[bin] } else if bin == 0 { 0 } else { self.own[bin - 1] };
+        let count = if upper {
+            self.own[bin]
+        } else if bin == 0 {
+            0
+        } else {
+            self.own[bin - 1]
+        };
         let c = u128::from(count) * m;
         let strictly = !upper && c < n * m;
         let holds = |i: &usize| {
@@ -147,13 +155,7 @@ impl Curve {
 
 impl HistogramMatch {
     fn binning(&self, channel: Channel) -> Binning {
-        Binning {
-            bins: self.bins,
-            low: self.range.0.into(),
-            high: self.range.1.into(),
-            channel,
-            outside: Outside::Clamp,
-        }
+        Binning { bins: self.bins, low: self.range.0.into(), high: self.range.1.into(), channel, outside: Outside::Clamp }
     }
 }
 

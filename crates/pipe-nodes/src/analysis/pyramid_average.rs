@@ -6,7 +6,7 @@
 use pipe_graph::prelude::*;
 use smart_default::SmartDefault;
 
-use super::reduction::{self, Mean, finite_values, view, View};
+use super::reduction::{self, Mean, View, finite_values, view};
 use crate::shader;
 
 /// The mean of every channel, alpha included, exact for every size. Values that are NaN or infinite take no part.

@@ -35,27 +35,13 @@ pub(crate) enum View {
 
 /// The mean of every channel of an image, or of its luminance in every component: a scalar. Values that are not
 /// finite take no part; 0 when none is left.
-pub(crate) fn mean(
-    cx: &mut Lowering<'_>,
-    suffix: &str,
-    image: ResourceId,
-    mean: Mean,
-    epsilon: f32,
-    luminance: bool,
-) -> ResourceId {
+pub(crate) fn mean(cx: &mut Lowering<'_>, suffix: &str, image: ResourceId, mean: Mean, epsilon: f32, luminance: bool) -> ResourceId {
     let view = if luminance { View::Luminance } else { View::Channels };
     mean_of(cx, suffix, image, mean, epsilon, view)
 }
 
 /// As [`mean`], of any view.
-pub(crate) fn mean_of(
-    cx: &mut Lowering<'_>,
-    suffix: &str,
-    image: ResourceId,
-    mean: Mean,
-    epsilon: f32,
-    view: View,
-) -> ResourceId {
+pub(crate) fn mean_of(cx: &mut Lowering<'_>, suffix: &str, image: ResourceId, mean: Mean, epsilon: f32, view: View) -> ResourceId {
     let (measure, finish) = match mean {
         Mean::Arithmetic => (0, 0),
         Mean::Geometric => (1, 1),

@@ -2,8 +2,8 @@
 
 use pipe_graph::prelude::*;
 
-use super::reduction::{self, Mean, View, finite_values, view};
 use super::quantile::{quantile_reference, quantiles};
+use super::reduction::{self, Mean, View, finite_values, view};
 
 /// The statistics of an image, each a Scalar. Of a colour image the four components are R, G, B and the luminance
 /// Y = 0.2126 R + 0.7152 G + 0.0722 B (alpha is left out); of an image of one or two channels, its channels.
@@ -18,22 +18,20 @@ pub(crate) struct Stats {
     image: In<Image>,
 }
 
-pub(crate) const KIND: Kind = Kind::of::<Stats>(
-    "Stats",
-    Category::Analysis,
-    &[r#"Stats(image: "in")"#, r#"Stats(image: "grey")"#, r#"Stats(image: "pair")"#],
-)
-.ports(&[
-    ("min", "the smallest value"),
-    ("max", "the largest value"),
-    ("mean", "the arithmetic mean"),
-    ("stddev", "the standard deviation of the population, √(Σ(v − mean)²/n)"),
-    ("median", "the value that half of the pixels stay below; between two values, their mean"),
-    ("p01", "the 1st percentile, interpolated linearly between pixels as `numpy.percentile` does"),
-    ("p99", "the 99th percentile"),
-    ("nan_count", "how many values are not a number"),
-    ("inf_count", "how many values are infinite"),
-]);
+pub(crate) const KIND: Kind =
+    Kind::of::<Stats>("Stats", Category::Analysis, &[r#"Stats(image: "in")"#, r#"Stats(image: "grey")"#, r#"Stats(image: "pair")"#]).ports(
+        &[
+            ("min", "the smallest value"),
+            ("max", "the largest value"),
+            ("mean", "the arithmetic mean"),
+            ("stddev", "the standard deviation of the population, √(Σ(v − mean)²/n)"),
+            ("median", "the value that half of the pixels stay below; between two values, their mean"),
+            ("p01", "the 1st percentile, interpolated linearly between pixels as `numpy.percentile` does"),
+            ("p99", "the 99th percentile"),
+            ("nan_count", "how many values are not a number"),
+            ("inf_count", "how many values are infinite"),
+        ],
+    );
 
 /// The quantiles behind `median`, `p01` and `p99`.
 const FRACTIONS: [(&str, f64); 3] = [("median", 0.5), ("p01", 0.01), ("p99", 0.99)];

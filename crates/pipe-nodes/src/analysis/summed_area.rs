@@ -43,9 +43,7 @@ pub(crate) fn table(cx: &mut Lowering<'_>, suffix: &str, image: ResourceId, way:
     let build = Build { suffix, size: ty.size, channels: ty.channels };
     match way {
         Way::Steps(radix) => build.steps(cx, image, radix),
-        Way::Scan if cx.limits().profile == Profile::Gpu && build.carry_bytes() <= cx.limits().max_binding_bytes => {
-            build.tiles(cx, image)
-        }
+        Way::Scan if cx.limits().profile == Profile::Gpu && build.carry_bytes() <= cx.limits().max_binding_bytes => build.tiles(cx, image),
         Way::Scan => build.lines(cx, image),
     }
 }

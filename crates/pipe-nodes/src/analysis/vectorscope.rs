@@ -30,11 +30,7 @@ pub(crate) struct Vectorscope {
 pub(crate) const KIND: Kind = Kind::of::<Vectorscope>(
     "Vectorscope",
     Category::Analysis,
-    &[
-        r#"Vectorscope(image: "in")"#,
-        r#"Vectorscope(image: "in", size: 65, zoom: 0.3)"#,
-        r#"Vectorscope(image: "grey", size: 32)"#,
-    ],
+    &[r#"Vectorscope(image: "in")"#, r#"Vectorscope(image: "in", size: 65, zoom: 0.3)"#, r#"Vectorscope(image: "grey", size: 32)"#],
 )
 .ports(&[("out", "the picture, RGBA")]);
 

@@ -115,12 +115,6 @@ impl Waveform {
     }
 
     fn binning(&self, channel: Channel) -> Binning {
-        Binning {
-            bins: self.levels,
-            low: self.range.0.into(),
-            high: self.range.1.into(),
-            channel,
-            outside: Outside::Ignore,
-        }
+        Binning { bins: self.levels, low: self.range.0.into(), high: self.range.1.into(), channel, outside: Outside::Ignore }
     }
 }

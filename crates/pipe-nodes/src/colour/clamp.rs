@@ -22,11 +22,7 @@ pub(super) struct Clamp {
 pub(super) const KIND: Kind = Kind::of::<Clamp>(
     "Clamp",
     Category::Colour,
-    &[
-        r#"Clamp(image: "in")"#,
-        r#"Clamp(image: "in", min: -0.1, max: "scalar")"#,
-        r#"Clamp(image: "grey", min: 0.2, max: 0.4)"#,
-    ],
+    &[r#"Clamp(image: "in")"#, r#"Clamp(image: "in", min: -0.1, max: "scalar")"#, r#"Clamp(image: "grey", min: 0.2, max: 0.4)"#],
 );
 
 impl Node for Clamp {

@@ -18,15 +18,9 @@ pub(super) struct Gamma {
     gamma: f32,
 }
 
-pub(super) const KIND: Kind = Kind::of::<Gamma>(
-    "Gamma",
-    Category::Colour,
-    &[
-        r#"Gamma(image: "in", gamma: 2.2)"#,
-        r#"Gamma(image: "grey", gamma: 0.5)"#,
-    ],
-)
-.tolerance(1e-6, 2e-5);
+pub(super) const KIND: Kind =
+    Kind::of::<Gamma>("Gamma", Category::Colour, &[r#"Gamma(image: "in", gamma: 2.2)"#, r#"Gamma(image: "grey", gamma: 0.5)"#])
+        .tolerance(1e-6, 2e-5);
 
 impl Node for Gamma {
     fn outputs(&self, inputs: &mut Inputs<'_>) -> Result<Vec<Output>, Mistake> {

@@ -20,10 +20,7 @@ pub(super) struct HueShift {
 pub(super) const KIND: Kind = Kind::of::<HueShift>(
     "HueShift",
     Category::Colour,
-    &[
-        r#"HueShift(image: "in", degrees: 40)"#,
-        r#"HueShift(image: "in", degrees: -120)"#,
-    ],
+    &[r#"HueShift(image: "in", degrees: 40)"#, r#"HueShift(image: "in", degrees: -120)"#],
 );
 
 impl Node for HueShift {
@@ -44,11 +41,7 @@ impl Node for HueShift {
         map_rgb(cx, &self.image, |[r, g, b]| {
             let third = (r + g + b) / 3.0 * (1.0 - cosine);
             let k = 1.0 / 3.0_f64.sqrt();
-            [
-                r * cosine + k * (b - g) * sine + third,
-                g * cosine + k * (r - b) * sine + third,
-                b * cosine + k * (g - r) * sine + third,
-            ]
+            [r * cosine + k * (b - g) * sine + third, g * cosine + k * (r - b) * sine + third, b * cosine + k * (g - r) * sine + third]
         })
     }
 }

@@ -13,14 +13,7 @@ pub(super) struct Invert {
     image: In<Image>,
 }
 
-pub(super) const KIND: Kind = Kind::of::<Invert>(
-    "Invert",
-    Category::Colour,
-    &[
-        r#"Invert(image: "in")"#,
-        r#"Invert(image: "grey")"#,
-    ],
-);
+pub(super) const KIND: Kind = Kind::of::<Invert>("Invert", Category::Colour, &[r#"Invert(image: "in")"#, r#"Invert(image: "grey")"#]);
 
 impl Node for Invert {
     fn outputs(&self, inputs: &mut Inputs<'_>) -> Result<Vec<Output>, Mistake> {

@@ -22,10 +22,7 @@ pub(super) struct Posterize {
 pub(super) const KIND: Kind = Kind::of::<Posterize>(
     "Posterize",
     Category::Colour,
-    &[
-        r#"Posterize(image: "in", levels: 4)"#,
-        r#"Posterize(image: "grey", levels: 256)"#,
-    ],
+    &[r#"Posterize(image: "in", levels: 4)"#, r#"Posterize(image: "grey", levels: 256)"#],
 );
 
 impl Node for Posterize {

@@ -13,13 +13,7 @@ pub(super) struct Premultiply {
     image: In<Image>,
 }
 
-pub(super) const KIND: Kind = Kind::of::<Premultiply>(
-    "Premultiply",
-    Category::Colour,
-    &[
-        r#"Premultiply(image: "in")"#,
-    ],
-);
+pub(super) const KIND: Kind = Kind::of::<Premultiply>("Premultiply", Category::Colour, &[r#"Premultiply(image: "in")"#]);
 
 impl Node for Premultiply {
     fn outputs(&self, inputs: &mut Inputs<'_>) -> Result<Vec<Output>, Mistake> {

@@ -20,11 +20,7 @@ pub(super) struct Saturation {
 pub(super) const KIND: Kind = Kind::of::<Saturation>(
     "Saturation",
     Category::Colour,
-    &[
-        r#"Saturation(image: "in", factor: 0.3)"#,
-        r#"Saturation(image: "in", factor: 1.8)"#,
-        r#"Saturation(image: "grey", factor: 0)"#,
-    ],
+    &[r#"Saturation(image: "in", factor: 0.3)"#, r#"Saturation(image: "in", factor: 1.8)"#, r#"Saturation(image: "grey", factor: 0)"#],
 );
 
 impl Node for Saturation {

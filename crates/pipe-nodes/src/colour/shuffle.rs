@@ -46,11 +46,7 @@ enum Channel {
 pub(super) const KIND: Kind = Kind::of::<Shuffle>(
     "Shuffle",
     Category::Colour,
-    &[
-        r#"Shuffle(image: "in", r: B, b: R)"#,
-        r#"Shuffle(image: "in", r: A, g: Zero, b: One, a: R)"#,
-        r#"Shuffle(image: "grey", a: Zero)"#,
-    ],
+    &[r#"Shuffle(image: "in", r: B, b: R)"#, r#"Shuffle(image: "in", r: A, g: Zero, b: One, a: R)"#, r#"Shuffle(image: "grey", a: Zero)"#],
 )
 .tolerance(0.0, 0.0)
 .sets_alpha();

@@ -75,7 +75,12 @@ impl Node for ToneMap {
             Some(given) => cx.driven(given),
             None => {
                 let pixels = &cx.image(&self.image).pixels;
-                let logs: Vec<f64> = pixels.iter().map(|p| luminance(*p)).filter(|y| y.is_finite()).map(|y| (f64::from(EPSILON) + y.max(0.0)).ln()).collect();
+                let logs: Vec<f64> = pixels
+                    .iter()
+                    .map(|p| luminance(*p))
+                    .filter(|y| y.is_finite())
+                    .map(|y| (f64::from(EPSILON) + y.max(0.0)).ln())
+                    .collect();
                 (logs.iter().sum::<f64>() / logs.len().max(1) as f64).exp()
             }
         };

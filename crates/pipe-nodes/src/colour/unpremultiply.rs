@@ -13,13 +13,7 @@ pub(super) struct Unpremultiply {
     image: In<Image>,
 }
 
-pub(super) const KIND: Kind = Kind::of::<Unpremultiply>(
-    "Unpremultiply",
-    Category::Colour,
-    &[
-        r#"Unpremultiply(image: "in")"#,
-    ],
-);
+pub(super) const KIND: Kind = Kind::of::<Unpremultiply>("Unpremultiply", Category::Colour, &[r#"Unpremultiply(image: "in")"#]);
 
 impl Node for Unpremultiply {
     fn outputs(&self, inputs: &mut Inputs<'_>) -> Result<Vec<Output>, Mistake> {
@@ -33,6 +27,9 @@ impl Node for Unpremultiply {
 
     fn reference(&self, cx: &Reference<'_>) -> Vec<Tensor> {
         let image = cx.image(&self.image);
-        vec![Tensor::Image(image.map(image.channels, |[r, g, b, a]| { let d = if a == 0.0 { 1.0 } else { a }; [r / d, g / d, b / d, a] }))]
+        vec![Tensor::Image(image.map(image.channels, |[r, g, b, a]| {
+            let d = if a == 0.0 { 1.0 } else { a };
+            [r / d, g / d, b / d, a]
+        }))]
     }
 }

@@ -135,7 +135,8 @@ impl CopyRegion {
         let row = w * u64::from(region.channels);
         let row_pitch = self.row_pitch.map_or(row, u64::from);
         if row_pitch < row {
-            return Err(Mistake::in_field("row_pitch", format!("is {row_pitch}, but a row takes {row} entries")).hint(format!("expected at least {row}")));
+            return Err(Mistake::in_field("row_pitch", format!("is {row_pitch}, but a row takes {row} entries"))
+                .hint(format!("expected at least {row}")));
         }
         let slice = row_pitch * h;
         let slice_pitch = self.slice_pitch.map_or(slice, u64::from);
@@ -193,9 +194,7 @@ fn conversion(src: &EdgeType, dst: &EdgeType) -> &'static str {
         (EdgeType::Table(TableType { element: Element::U32, .. }), Element::U32) => {
             "alias Entry = u32;\nfn entry(v: u32) -> u32 { return v; }\n"
         }
-        (_, Element::U32) => {
-            "alias Entry = u32;\nfn entry(v: f32) -> u32 { return u32(round(clamp(v, 0.0, 4294967040.0))); }\n"
-        }
+        (_, Element::U32) => "alias Entry = u32;\nfn entry(v: f32) -> u32 { return u32(round(clamp(v, 0.0, 4294967040.0))); }\n",
         (EdgeType::Table(TableType { element: Element::U32, .. }), Element::F32) => {
             "alias Entry = f32;\nfn entry(v: u32) -> f32 { return f32(v); }\n"
         }

@@ -132,7 +132,8 @@ fn runtime_literals(text: &str) -> String {
     let mut rest = text;
     let mut before = ' ';
     while let Some(c) = rest.chars().next() {
-        let length = if c.is_ascii_digit() && !(before.is_ascii_alphanumeric() || before == '_' || before == '.') { literal(rest) } else { 0 };
+        let length =
+            if c.is_ascii_digit() && !(before.is_ascii_alphanumeric() || before == '_' || before == '.') { literal(rest) } else { 0 };
         if length > 0 {
             out.push_str("number(");
             out.push_str(&rest[..length]);

@@ -115,8 +115,7 @@ impl Node for Math {
         match (self.op.is_unary(), &self.b) {
             (true, Some(_)) => inputs.warn(Mistake::in_field("b", format!("`{:?}` has one operand; `b` is ignored", self.op))),
             (false, None) => {
-                return Err(Mistake::in_field("b", format!("`{:?}` needs a second operand", self.op))
-                    .hint("give `b` an image or a number"));
+                return Err(Mistake::in_field("b", format!("`{:?}` needs a second operand", self.op)).hint("give `b` an image or a number"));
             }
             _ => {}
         }

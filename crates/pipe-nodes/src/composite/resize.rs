@@ -107,11 +107,7 @@ impl Resize {
         Ok(match self.fit {
             Fit::Stretch => stretched(wanted),
             Fit::Contain => stretched(contained),
-            Fit::Letterbox => Placement {
-                out: wanted,
-                origin: [0, 1].map(|i| (wanted[i] - contained[i]) / 2),
-                ..stretched(contained)
-            },
+            Fit::Letterbox => Placement { out: wanted, origin: [0, 1].map(|i| (wanted[i] - contained[i]) / 2), ..stretched(contained) },
             Fit::Cover => {
                 let factor = ratio[0].max(ratio[1]);
                 let axes = [0, 1].map(|i| {

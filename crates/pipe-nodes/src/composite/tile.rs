@@ -26,11 +26,7 @@ pub(crate) struct Tile {
 pub(crate) const KIND: Kind = Kind::of::<Tile>(
     "Tile",
     Category::Composite,
-    &[
-        r#"Tile(image: "in")"#,
-        r#"Tile(image: "in", columns: 3, rows: 2, mirror: true)"#,
-        r#"Tile(image: "grey", columns: 1, rows: 3)"#,
-    ],
+    &[r#"Tile(image: "in")"#, r#"Tile(image: "in", columns: 3, rows: 2, mirror: true)"#, r#"Tile(image: "grey", columns: 1, rows: 3)"#],
 )
 .tolerance(0.0, 0.0);
 

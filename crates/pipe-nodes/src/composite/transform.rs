@@ -210,10 +210,9 @@ mod tests {
         let input = Tensor::Image(image);
         let turn = Transform { rotate: 30.0, ..Transform::default() };
         let grow = Transform { scale: Pair::Both(1.5), translate: [2.25, -0.5], ..Transform::default() };
-        for (node, expected) in [
-            (turn, [0.365484, 0.0, 0.596253, 0.553722, 0.723423]),
-            (grow, [0.230769, 0.5, 0.773504, 0.508547, 0.444444]),
-        ] {
+        for (node, expected) in
+            [(turn, [0.365484, 0.0, 0.596253, 0.553722, 0.723423]), (grow, [0.230769, 0.5, 0.773504, 0.508547, 0.444444])]
+        {
             let node = Transform { image: In::new(pipe_graph::field::EdgeIndex(0)), filter: Filtering::Linear, ..node };
             let cx = Reference { inputs: &[&input], file: None, border: Border::Clamp, filter: Filter::Linear, seed: 0 };
             let Tensor::Image(got) = &node.reference(&cx)[0] else { panic!("the result is an image") };

@@ -77,7 +77,8 @@ fn chosen(sigma: f32, given_radius: Option<u32>, given: &[f32]) -> Vec<f64> {
 
 fn check(given: &[f32]) -> Result<(), Mistake> {
     if !given.is_empty() && given.len().is_multiple_of(2) {
-        return Err(Mistake::in_field("weights", format!("has {} entries", given.len())).hint("expected an odd number, the middle one for the pixel itself"));
+        return Err(Mistake::in_field("weights", format!("has {} entries", given.len()))
+            .hint("expected an odd number, the middle one for the pixel itself"));
     }
     if given.len() > 6001 {
         return Err(Mistake::in_field("weights", format!("has {} entries", given.len())).hint("expected at most 6001"));

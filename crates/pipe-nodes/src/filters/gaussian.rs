@@ -13,7 +13,8 @@ pub(super) fn radius(sigma: f32) -> u32 {
 /// exp(−k²/2σ²), k = −R..R, normalised to sum 1, in double precision. σ = 0 is a single tap.
 pub(super) fn weights(sigma: f32, radius: u32) -> Vec<f64> {
     let (s, r) = (f64::from(sigma), i64::from(radius));
-    let raw: Vec<f64> = (-r..=r).map(|k| if s > 0.0 { (-((k * k) as f64) / (2.0 * s * s)).exp() } else { f64::from(u8::from(k == 0)) }).collect();
+    let raw: Vec<f64> =
+        (-r..=r).map(|k| if s > 0.0 { (-((k * k) as f64) / (2.0 * s * s)).exp() } else { f64::from(u8::from(k == 0)) }).collect();
     let sum: f64 = raw.iter().sum();
     raw.into_iter().map(|w| w / sum).collect()
 }

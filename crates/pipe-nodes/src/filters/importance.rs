@@ -28,15 +28,21 @@ pub(super) struct GaussianImportance {
 pub(super) const KIND: Kind = Kind::of::<GaussianImportance>(
     "GaussianImportance",
     Category::Filters,
-    &[r#"GaussianImportance(image: "in")"#, r#"GaussianImportance(image: "grey", sigma: 5, samples: 16)"#, r#"GaussianImportance(image: "in", samples: 1)"#],
+    &[
+        r#"GaussianImportance(image: "in")"#,
+        r#"GaussianImportance(image: "grey", sigma: 5, samples: 16)"#,
+        r#"GaussianImportance(image: "in", samples: 1)"#,
+    ],
 );
 
 /// The inverse of the normal distribution function, by Acklam's rational approximation refined by one Halley step to
 /// double precision.
 fn probit(p: f64) -> f64 {
-    const A: [f64; 6] = [-3.969683028665376e1, 2.209460984245205e2, -2.759285104469687e2, 1.383_577_518_672_69e2, -3.066479806614716e1, 2.506628277459239];
+    const A: [f64; 6] =
+        [-3.969683028665376e1, 2.209460984245205e2, -2.759285104469687e2, 1.383_577_518_672_69e2, -3.066479806614716e1, 2.506628277459239];
     const B: [f64; 5] = [-5.447609879822406e1, 1.615858368580409e2, -1.556989798598866e2, 6.680131188771972e1, -1.328068155288572e1];
-    const C: [f64; 6] = [-7.784894002430293e-3, -3.223964580411365e-1, -2.400758277161838, -2.549732539343734, 4.374664141464968, 2.938163982698783];
+    const C: [f64; 6] =
+        [-7.784894002430293e-3, -3.223964580411365e-1, -2.400758277161838, -2.549732539343734, 4.374664141464968, 2.938163982698783];
     const D: [f64; 4] = [7.784695709041462e-3, 3.224671290700398e-1, 2.445134137142996, 3.754408661907416];
     let poly = |c: &[f64], x: f64| c.iter().fold(0.0, |s, c| s * x + c);
     let tail = |p: f64| {

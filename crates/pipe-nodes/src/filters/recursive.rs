@@ -67,7 +67,10 @@ pub(super) fn recursive(cx: &mut Lowering<'_>, prefix: &str, sigma: [f32; 2], im
         let grid = if along_x { [size[0].div_ceil(run), size[1], 1] } else { [size[0], size[1].div_ceil(run), 1] };
         for (name, backward) in [("forward", false), ("backward", true)] {
             let mut pass = cx
-                .pass(&format!("{prefix}{suffix}.{name}"), if backward { shader!("filters/recursive_backward") } else { shader!("filters/recursive_forward") })
+                .pass(
+                    &format!("{prefix}{suffix}.{name}"),
+                    if backward { shader!("filters/recursive_backward") } else { shader!("filters/recursive_forward") },
+                )
                 .entry(Entry::Each)
                 .grid(Grid::Elements(grid))
                 .read("image", from, reach);

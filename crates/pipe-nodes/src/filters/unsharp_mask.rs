@@ -27,7 +27,11 @@ pub(super) struct UnsharpMask {
 pub(super) const KIND: Kind = Kind::of::<UnsharpMask>(
     "UnsharpMask",
     Category::Filters,
-    &[r#"UnsharpMask(image: "in")"#, r#"UnsharpMask(image: "in", sigma: 1, amount: 0.5)"#, r#"UnsharpMask(image: "grey", sigma: 3, amount: 2)"#],
+    &[
+        r#"UnsharpMask(image: "in")"#,
+        r#"UnsharpMask(image: "in", sigma: 1, amount: 0.5)"#,
+        r#"UnsharpMask(image: "grey", sigma: 3, amount: 2)"#,
+    ],
 )
 .tolerance(1e-5, 1e-5);
 

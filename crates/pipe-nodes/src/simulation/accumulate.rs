@@ -40,11 +40,7 @@ const fn tenth() -> f32 {
 pub(crate) const KIND: Kind = Kind::of::<Accumulate>(
     "Accumulate",
     Category::Simulation,
-    &[
-        r#"Accumulate(image: "in")"#,
-        r#"Accumulate(image: "in", op: Ema(alpha: 0.2))"#,
-        r#"Accumulate(image: "grey", op: Max)"#,
-    ],
+    &[r#"Accumulate(image: "in")"#, r#"Accumulate(image: "in", op: Ema(alpha: 0.2))"#, r#"Accumulate(image: "grey", op: Max)"#],
 );
 
 impl Node for Accumulate {

@@ -49,7 +49,10 @@ impl Node for HeatDiffusion {
     fn outputs(&self, inputs: &mut Inputs<'_>) -> Result<Vec<Output>, Mistake> {
         if self.rate() > 0.25 {
             let limit = 0.25 / self.alpha;
-            inputs.warn(Mistake::in_field("dt", format!("{} is beyond the stability limit, {limit}", self.dt)).hint(format!("expected at most {limit}")));
+            inputs.warn(
+                Mistake::in_field("dt", format!("{} is beyond the stability limit, {limit}", self.dt))
+                    .hint(format!("expected at most {limit}")),
+            );
         }
         let image = inputs.image(&self.image);
         Ok(Output::out(EdgeType::image(image.size, image.channels)))

@@ -45,9 +45,7 @@ impl Rule {
     fn parse(text: &str) -> Option<Self> {
         let lower = text.trim().to_ascii_lowercase();
         let (birth, survival) = lower.split_once('/')?;
-        let set = |digits: &str| {
-            digits.chars().try_fold(0_u32, |set, c| c.to_digit(9).map(|n| set | 1 << n))
-        };
+        let set = |digits: &str| digits.chars().try_fold(0_u32, |set, c| c.to_digit(9).map(|n| set | 1 << n));
         Some(Self { birth: set(birth.strip_prefix('b')?)?, survival: set(survival.strip_prefix('s')?)? })
     }
 }

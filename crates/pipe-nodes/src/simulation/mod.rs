@@ -17,12 +17,5 @@ mod wave_twin;
 use pipe_graph::node::Kind;
 
 /// The kinds of this section, in the order of the reference.
-pub(crate) const KINDS: &[Kind] = &[
-    wave_equation::KIND,
-    wave_step::KIND,
-    heat_diffusion::KIND,
-    reaction_diffusion::KIND,
-    life::KIND,
-    jacobi::KIND,
-    accumulate::KIND,
-];
+pub(crate) const KINDS: &[Kind] =
+    &[wave_equation::KIND, wave_step::KIND, heat_diffusion::KIND, reaction_diffusion::KIND, life::KIND, jacobi::KIND, accumulate::KIND];

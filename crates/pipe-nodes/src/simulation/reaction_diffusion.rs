@@ -61,7 +61,10 @@ impl Node for ReactionDiffusion {
         let fastest = self.du.max(self.dv);
         if fastest * self.dt > 0.25 {
             let limit = 0.25 / fastest;
-            inputs.warn(Mistake::in_field("dt", format!("{} is beyond the stability limit, {limit}", self.dt)).hint(format!("expected at most {limit}")));
+            inputs.warn(
+                Mistake::in_field("dt", format!("{} is beyond the stability limit, {limit}", self.dt))
+                    .hint(format!("expected at most {limit}")),
+            );
         }
         Ok(Output::out(EdgeType::image(inputs.image(&self.image).size, 2)))
     }

@@ -145,11 +145,7 @@ impl WaveEquation {
     }
 
     fn verlet_stage(&self, cx: &mut Lowering<'_>, suffix: &str, stage: i32, state: ResourceId, next: ResourceId) {
-        self.medium()
-            .pass(cx, suffix, &shader!("simulation/wave_verlet"), state)
-            .write("out", next)
-            .constant("STAGE", stage)
-            .add();
+        self.medium().pass(cx, suffix, &shader!("simulation/wave_verlet"), state).write("out", next).constant("STAGE", stage).add();
     }
 
     fn implicit(&self, cx: &mut Lowering<'_>, theta: f64, state: ResourceId) -> Result<ResourceId, Mistake> {
@@ -171,9 +167,13 @@ impl WaveEquation {
                 let pass = if steps > 1 {
                     let shader = shader!("simulation/relax_blocked");
                     let border = medium.boundary.border();
-                    medium
-                        .blocked_pass(cx, "relax", &shader, steps, [pair, next])
-                        .read_with("rhs", rhs, Reach::Around(steps, steps), border, Filter::Nearest)
+                    medium.blocked_pass(cx, "relax", &shader, steps, [pair, next]).read_with(
+                        "rhs",
+                        rhs,
+                        Reach::Around(steps, steps),
+                        border,
+                        Filter::Nearest,
+                    )
                 } else {
                     medium.pass(cx, "relax", &shader!("simulation/wave_relax"), pair).read("rhs", rhs, Reach::Point).write("out", next)
                 };

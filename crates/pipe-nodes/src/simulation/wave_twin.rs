@@ -66,9 +66,7 @@ fn plus(a: &[f64], k: f64, b: &[f64]) -> Vec<f64> {
 pub(super) fn step(grid: &Grid64, integrator: Integrator, u: &[f64], v: &[f64]) -> (Vec<f64>, Vec<f64>) {
     let h = f64::from(grid.medium.dt);
     let gamma = grid.damping();
-    let slope = |u: &[f64], v: &[f64]| -> Vec<f64> {
-        grid.curvature(u).iter().zip(v).zip(&gamma).map(|((l, v), g)| l - g * v).collect()
-    };
+    let slope = |u: &[f64], v: &[f64]| -> Vec<f64> { grid.curvature(u).iter().zip(v).zip(&gamma).map(|((l, v), g)| l - g * v).collect() };
     let a = slope(u, v);
     match integrator {
         Integrator::Euler => (plus(u, h, v), plus(v, h, &a)),

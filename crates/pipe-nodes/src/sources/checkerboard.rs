@@ -29,10 +29,7 @@ pub(super) struct Checkerboard {
 pub(super) const KIND: Kind = Kind::of::<Checkerboard>(
     "Checkerboard",
     Category::Sources,
-    &[
-        r#"Checkerboard(size: (64, 48), cell: 8)"#,
-        r#"Checkerboard(size: (65, 31), cell: 7, a: (1, 0, 0, 1), b: (0, 0, 1, 0))"#,
-    ],
+    &[r#"Checkerboard(size: (64, 48), cell: 8)"#, r#"Checkerboard(size: (65, 31), cell: 7, a: (1, 0, 0, 1), b: (0, 0, 1, 0))"#],
 )
 .tolerance(0.0, 0.0)
 .sets_alpha();

@@ -16,15 +16,9 @@ pub(super) struct ColorBars {
     size: [u32; 2],
 }
 
-pub(super) const KIND: Kind = Kind::of::<ColorBars>(
-    "ColorBars",
-    Category::Sources,
-    &[
-        r#"ColorBars(size: (64, 8))"#,
-        r#"ColorBars(size: (61, 3))"#,
-    ],
-)
-.tolerance(0.0, 0.0);
+pub(super) const KIND: Kind =
+    Kind::of::<ColorBars>("ColorBars", Category::Sources, &[r#"ColorBars(size: (64, 8))"#, r#"ColorBars(size: (61, 3))"#])
+        .tolerance(0.0, 0.0);
 
 impl Node for ColorBars {
     fn outputs(&self, _: &mut Inputs<'_>) -> Result<Vec<Output>, Mistake> {

@@ -19,15 +19,10 @@ pub(super) struct Constant {
     size: [u32; 2],
 }
 
-pub(super) const KIND: Kind = Kind::of::<Constant>(
-    "Constant",
-    Category::Sources,
-    &[
-        r#"Constant(color: (1.0, 0.5, 0.25, 1.0), size: (64, 48))"#,
-    ],
-)
-.tolerance(0.0, 0.0)
-.sets_alpha();
+pub(super) const KIND: Kind =
+    Kind::of::<Constant>("Constant", Category::Sources, &[r#"Constant(color: (1.0, 0.5, 0.25, 1.0), size: (64, 48))"#])
+        .tolerance(0.0, 0.0)
+        .sets_alpha();
 
 impl Node for Constant {
     fn outputs(&self, _: &mut Inputs<'_>) -> Result<Vec<Output>, Mistake> {

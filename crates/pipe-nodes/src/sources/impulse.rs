@@ -24,10 +24,7 @@ pub(super) struct Impulse {
 pub(super) const KIND: Kind = Kind::of::<Impulse>(
     "Impulse",
     Category::Sources,
-    &[
-        r#"Impulse(size: (33, 21))"#,
-        r#"Impulse(size: (8, 8), position: (1, 6), value: 3)"#,
-    ],
+    &[r#"Impulse(size: (33, 21))"#, r#"Impulse(size: (8, 8), position: (1, 6), value: 3)"#],
 )
 .tolerance(0.0, 0.0);
 

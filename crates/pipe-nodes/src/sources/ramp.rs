@@ -27,10 +27,7 @@ pub(super) struct Ramp {
 pub(super) const KIND: Kind = Kind::of::<Ramp>(
     "Ramp",
     Category::Sources,
-    &[
-        r#"Ramp(size: (64, 48))"#,
-        r#"Ramp(from: (1, 0, 0, 1), to: (0, 2, 1, 0.5), direction: Vertical, size: (7, 33))"#,
-    ],
+    &[r#"Ramp(size: (64, 48))"#, r#"Ramp(from: (1, 0, 0, 1), to: (0, 2, 1, 0.5), direction: Vertical, size: (7, 33))"#],
 )
 .sets_alpha();
 

@@ -17,15 +17,9 @@ pub(super) struct ZonePlate {
     size: [u32; 2],
 }
 
-pub(super) const KIND: Kind = Kind::of::<ZonePlate>(
-    "ZonePlate",
-    Category::Sources,
-    &[
-        r#"ZonePlate(size: (128, 96))"#,
-        r#"ZonePlate(size: (61, 47))"#,
-    ],
-)
-.tolerance(1e-4, 0.0);
+pub(super) const KIND: Kind =
+    Kind::of::<ZonePlate>("ZonePlate", Category::Sources, &[r#"ZonePlate(size: (128, 96))"#, r#"ZonePlate(size: (61, 47))"#])
+        .tolerance(1e-4, 0.0);
 
 impl Node for ZonePlate {
     fn outputs(&self, _: &mut Inputs<'_>) -> Result<Vec<Output>, Mistake> {

@@ -28,7 +28,10 @@ pub(super) struct Readback {
 pub(super) const KIND: Kind = Kind::of::<Readback>(
     "Readback",
     Category::Structure,
-    &[r#"Readback(source: "table", path: "histogram.csv")"#, r#"Readback(source: "in", path: "corner.json", region: (0, 0, 1, 1), channels: "rgb")"#],
+    &[
+        r#"Readback(source: "table", path: "histogram.csv")"#,
+        r#"Readback(source: "in", path: "corner.json", region: (0, 0, 1, 1), channels: "rgb")"#,
+    ],
 )
 .ports(&[]);
 
@@ -49,7 +52,11 @@ impl Readback {
         let names = self.channels.as_deref().unwrap_or_default().to_lowercase();
         names
             .chars()
-            .map(|c| "rgba".find(c).ok_or_else(|| Mistake::in_field("channels", format!("has no meaning for `{c}`")).hint("expected some of r g b a")))
+            .map(|c| {
+                "rgba"
+                    .find(c)
+                    .ok_or_else(|| Mistake::in_field("channels", format!("has no meaning for `{c}`")).hint("expected some of r g b a"))
+            })
             .collect()
     }
 }

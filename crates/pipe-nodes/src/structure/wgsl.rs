@@ -245,8 +245,11 @@ impl Node for Wgsl {
         let text = cx.loader.text(&path).map_err(|reason| Mistake::in_field("shader", format!("cannot be read: {reason}")))?;
         let (_, function) = self.entry();
         if !defines(&text, function) {
-            return Err(Mistake::in_field("shader", format!("defines no `fn {function}`"))
-                .hint(format!("with access {:?} and {} output(s) the shader defines `{function}`", self.access, self.outputs.len())));
+            return Err(Mistake::in_field("shader", format!("defines no `fn {function}`")).hint(format!(
+                "with access {:?} and {} output(s) the shader defines `{function}`",
+                self.access,
+                self.outputs.len()
+            )));
         }
         if self.access == Access::Point && self.outputs.len() > 1 {
             return Err(Mistake::in_field("access", "is Point, which has one output").hint("use Around(0) and `fn each(xy: vec2i)`"));
@@ -269,8 +272,11 @@ impl Node for Wgsl {
                 if let EdgeType::Image(out) = outputs[0].ty
                     && out.size != size
                 {
-                    return Err(Mistake::in_field(format!("inputs.{name}"), format!("is {}x{}, the output is {}x{}", size[0], size[1], out.size[0], out.size[1]))
-                        .hint("with access Point or Around all images have the output's size; use Whole"));
+                    return Err(Mistake::in_field(
+                        format!("inputs.{name}"),
+                        format!("is {}x{}, the output is {}x{}", size[0], size[1], out.size[0], out.size[1]),
+                    )
+                    .hint("with access Point or Around all images have the output's size; use Whole"));
                 }
             }
         }
@@ -294,8 +300,9 @@ impl Node for Wgsl {
         let grid = match (entry, self.groups) {
             (Entry::Kernel, Some(groups)) => Grid::Groups(groups),
             (Entry::Kernel, None) => {
-                let size = workgroup_size(&shader.source)
-                    .ok_or_else(|| Mistake::in_field("shader", "says no workgroup size in numbers").hint("write `@workgroup_size(8, 8)`, or give `groups`"))?;
+                let size = workgroup_size(&shader.source).ok_or_else(|| {
+                    Mistake::in_field("shader", "says no workgroup size in numbers").hint("write `@workgroup_size(8, 8)`, or give `groups`")
+                })?;
                 let first = self.outputs.keys().next().map(|n| cx.output_type(n));
                 let cover = match first {
                     Some(EdgeType::Image(t)) => [t.size[0], t.size[1], 1],

@@ -103,16 +103,11 @@ fn position(entry: Entry, source: &str, shape: Shape) -> &'static str {
 }
 
 /// The main module of everything but a `Kernel`.
-pub(super) fn main_module(
-    pass: &KernelPass,
-    cover: &Cover,
-    _: &Block,
-    ops: &Ops,
-    index: &dyn Fn(ResourceId, bool) -> usize,
-) -> String {
+pub(super) fn main_module(pass: &KernelPass, cover: &Cover, _: &Block, ops: &Ops, index: &dyn Fn(ResourceId, bool) -> usize) -> String {
     let main = pass.stages.len() - 1;
     let stage = pass.last();
-    let bind: String = (0..=main).filter(|s| !pass.stages[*s].params.is_empty()).map(|s| format!("    package::s{s}::bind_params();\n")).collect();
+    let bind: String =
+        (0..=main).filter(|s| !pass.stages[*s].params.is_empty()).map(|s| format!("    package::s{s}::bind_params();\n")).collect();
     if stage.entry == Entry::Points {
         return format!(
             "@vertex\nfn vertex_main(@builtin(vertex_index) i: u32) -> @builtin(position) vec4f {{\n{bind}\
@@ -141,10 +136,7 @@ pub(super) fn main_module(
     match cover.position {
         "i32" => {
             let row = cover.groups[0] * sx;
-            let _ = write!(
-                text,
-                "    let at = i32(group.y * {row}u + group.x * {sx}u + local.x);\n    if at < {nx} {{ {body} }}\n"
-            );
+            let _ = write!(text, "    let at = i32(group.y * {row}u + group.x * {sx}u + local.x);\n    if at < {nx} {{ {body} }}\n");
         }
         "vec3i" => {
             let _ = write!(

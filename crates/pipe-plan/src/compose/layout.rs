@@ -128,7 +128,7 @@ fn body_of_main(text: &str) -> Option<usize> {
         from = at + 1;
     };
     let mut depth = 0;
-    
+
     text[main..].char_indices().find_map(|(i, c)| {
         match c {
             '(' => depth += 1,

@@ -176,14 +176,10 @@ pub(super) fn read_port(text: &mut String, port: &StagePort, raw: Raw) {
                 Border::Mirror => {
                     format!("let s = size_{n}(); let m = ((xy % (2 * s)) + 2 * s) % (2 * s); let p = min(m, 2 * s - 1 - m);")
                 }
-                Border::Black => format!(
-                    "if any(xy < {vi}(0)) || any(xy >= size_{n}()) {{ return vec4f(); }} let p = xy;"
-                ),
+                Border::Black => format!("if any(xy < {vi}(0)) || any(xy >= size_{n}()) {{ return vec4f(); }} let p = xy;"),
             };
-            let _ = writeln!(
-                text,
-                "fn size_{n}() -> {vi} {{ return {size}; }}\nfn load_{n}(xy: {vi}) -> vec4f {{ {place} return {fetch}; }}"
-            );
+            let _ =
+                writeln!(text, "fn size_{n}() -> {vi} {{ return {size}; }}\nfn load_{n}(xy: {vi}) -> vec4f {{ {place} return {fetch}; }}");
             let sample = match (port.filter, volume) {
                 (Filter::Nearest, _) => format!("return load_{n}({vi}(floor(uv * {vf}(size_{n}()))));"),
                 (Filter::Linear, false) => format!(
@@ -236,7 +232,9 @@ pub(super) fn write_port(text: &mut String, n: &str, i: usize, shape: Shape, acc
             let (ty, len) = (element(shape), len(shape));
             let _ = writeln!(text, "fn size_{n}() -> i32 {{ return {len}; }}");
             match access {
-                Access::Store => writeln!(text, "fn store_{n}(i: i32, v: {ty}) {{ if u32(i) < {len}u {{ package::io::put_r{i}(i, v); }} }}"),
+                Access::Store => {
+                    writeln!(text, "fn store_{n}(i: i32, v: {ty}) {{ if u32(i) < {len}u {{ package::io::put_r{i}(i, v); }} }}")
+                }
                 Access::Update => writeln!(
                     text,
                     "fn load_{n}(i: i32) -> {ty} {{ if u32(i) >= {len}u {{ return {ty}(0); }} return package::io::r{i}[i]; }}\n\

@@ -328,9 +328,7 @@ pub(crate) fn job(a: &RunArgs) -> Result<Job, Failure> {
     if let Some(most) = a.max_pixels {
         job.read.limits.max_pixels = most;
     }
-    let space = |text: &Option<String>| -> Result<Option<Colorspace>, Failure> {
-        Ok(text.as_deref().map(str::parse).transpose()?)
-    };
+    let space = |text: &Option<String>| -> Result<Option<Colorspace>, Failure> { Ok(text.as_deref().map(str::parse).transpose()?) };
     job.read.colorspace = space(&a.in_colorspace)?;
     job.write.colorspace = space(&a.out_colorspace)?;
     job.write.quality = a.quality;

@@ -97,7 +97,9 @@ fn one(session: &mut Session, a: &BenchArgs, size: [u32; 2]) -> Result<Value, Fa
 fn collect(steps: &[Step], times: u64, passes: &mut IndexMap<String, (Vec<String>, u64)>) {
     for step in steps {
         match step {
-            Step::Run(Run { name, nodes, bytes, .. }) => passes.entry(name.clone()).or_insert_with(|| (nodes.clone(), 0)).1 += bytes * times,
+            Step::Run(Run { name, nodes, bytes, .. }) => {
+                passes.entry(name.clone()).or_insert_with(|| (nodes.clone(), 0)).1 += bytes * times;
+            }
             Step::Repeat(r) => {
                 let n = match r.count {
                     Times::Fixed(n) | Times::Until { max: n, .. } => n,

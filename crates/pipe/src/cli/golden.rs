@@ -51,7 +51,10 @@ pub(super) fn test(a: &TestArgs) -> Result<(), Failure> {
     find(&a.folder, &mut folders).map_err(|e| Failure::World(format!("cannot read {}: {e}", a.folder.display())))?;
     folders.sort();
     if folders.is_empty() {
-        return Err(Failure::World(format!("{} holds no test\n  next: a test is a folder with graph.ron or test.json", a.folder.display())));
+        return Err(Failure::World(format!(
+            "{} holds no test\n  next: a test is a folder with graph.ron or test.json",
+            a.folder.display()
+        )));
     }
     let mut session = Session::open(&device_choice(a.device.device.as_deref()), cache_folder().as_deref())?;
     let (mut passed, mut failed, mut rows) = (0, 0, Vec::new());

@@ -2,8 +2,8 @@
 
 use std::fmt::Write as _;
 
-use pipe::{Failure, presets};
 use pipe::project::Project;
+use pipe::{Failure, presets};
 use pipe_graph::diagnostic::nearest;
 use pipe_nodes::reference;
 
@@ -20,7 +20,8 @@ pub(super) fn nodes(a: &NodesArgs) -> Result<(), Failure> {
         return print(&if a.markdown { reference::page(&registry) } else { reference::list(&registry) });
     };
     let Some(kind) = registry.get(name) else {
-        let hint = nearest(name, registry.iter().map(|k| k.name)).map_or("`pipe nodes` lists all".to_owned(), |n| format!("did you mean `{n}`?"));
+        let hint =
+            nearest(name, registry.iter().map(|k| k.name)).map_or("`pipe nodes` lists all".to_owned(), |n| format!("did you mean `{n}`?"));
         return Err(Failure::Graph(format!("there is no node `{name}`\n  next: {hint}")));
     };
     if a.json {

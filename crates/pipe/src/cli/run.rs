@@ -5,10 +5,10 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
+use pipe::Failure;
 use pipe::frames::{Sequence, run_sequence};
 use pipe::project::Project;
 use pipe::run::{Job, Report, Session, decode, input_kinds};
-use pipe::Failure;
 use pipe_graph::document::Document;
 use pipe_io::atomic::AtomicFile;
 use pipe_io::sequence::{FrameRange, Pattern};
@@ -34,9 +34,16 @@ pub(super) fn run(a: &RunArgs) -> Result<(), Failure> {
             let mut session = Session::open(&choice, cache.as_deref())?;
             let sequence = Sequence { frames, resume: a.resume, skip_bad: a.skip_bad_frames };
             let bar = output::progress(frames.into_iter().count() as u64, "frames");
-            let outcome = run_sequence(&mut session, &job, &sequence, &cancel, &|message| {
-                bar.suspend(|| output::say(message));
-            }, &|| bar.inc(1))?;
+            let outcome = run_sequence(
+                &mut session,
+                &job,
+                &sequence,
+                &cancel,
+                &|message| {
+                    bar.suspend(|| output::say(message));
+                },
+                &|| bar.inc(1),
+            )?;
             bar.finish_and_clear();
             output::say(&format!("{} frames written, {} skipped", outcome.written, outcome.skipped));
             if let Some(report) = outcome.last {
@@ -119,7 +126,11 @@ pub(super) fn bind(job: &mut Job, document: &Document, a: &RunArgs) -> Result<()
         ([], _) => {}
         ([one], 1..) => job.bind_input(one, files.next().expect("there is one")),
         (open, _) => {
-            return Err(Failure::Graph(format!("no file is bound to the input{} {}\n  next: give each as -i NAME=FILE", if open.len() > 1 { "s" } else { "" }, open.join(", "))));
+            return Err(Failure::Graph(format!(
+                "no file is bound to the input{} {}\n  next: give each as -i NAME=FILE",
+                if open.len() > 1 { "s" } else { "" },
+                open.join(", ")
+            )));
         }
     }
     match (open_outputs.as_slice(), files.len()) {
@@ -128,11 +139,17 @@ pub(super) fn bind(job: &mut Job, document: &Document, a: &RunArgs) -> Result<()
         ([one, ..], 1) => job.bind_output(one, files.next().expect("there is one"))?,
         (_, _) => {
             let extra: Vec<&str> = files.map(String::as_str).collect();
-            return Err(Failure::Graph(format!("do not know what to do with {}\n  next: bind files by name: -i NAME=FILE, -o NAME=FILE", extra.join(" "))));
+            return Err(Failure::Graph(format!(
+                "do not know what to do with {}\n  next: bind files by name: -i NAME=FILE, -o NAME=FILE",
+                extra.join(" ")
+            )));
         }
     }
     if job.outputs.is_empty() && job.dumps.is_empty() && !document.outputs.is_empty() && !has_readback(document) {
-        return Err(Failure::Graph(format!("no file is bound to the output {}\n  next: give one as the last argument, or as -o NAME=FILE", open_outputs.join(", "))));
+        return Err(Failure::Graph(format!(
+            "no file is bound to the output {}\n  next: give one as the last argument, or as -o NAME=FILE",
+            open_outputs.join(", ")
+        )));
     }
     Ok(())
 }
@@ -150,7 +167,9 @@ pub(super) fn refuse_overwriting(job: &Job) -> Result<(), Failure> {
     for out in job.outputs.values().chain(job.dumps.values()) {
         let Some(path) = Path::new(out).canonicalize().ok() else { continue };
         if let Some(input) = job.inputs.values().find(|i| real(i).as_ref() == Some(&path)) {
-            return Err(Failure::Graph(format!("the output {out} would overwrite the input {input}\n  next: choose another name, or add --force")));
+            return Err(Failure::Graph(format!(
+                "the output {out} would overwrite the input {input}\n  next: choose another name, or add --force"
+            )));
         }
     }
     Ok(())
@@ -228,7 +247,14 @@ fn trace(r: &Report) -> serde_json::Value {
     let mut events = Vec::new();
     let mut at = 0.0;
     let w = &r.wall;
-    for (name, ms) in [("decode", w.decode), ("plan", w.plan), ("upload", w.upload), ("compute", w.compute), ("readback", w.readback), ("encode", w.encode)] {
+    for (name, ms) in [
+        ("decode", w.decode),
+        ("plan", w.plan),
+        ("upload", w.upload),
+        ("compute", w.compute),
+        ("readback", w.readback),
+        ("encode", w.encode),
+    ] {
         events.push(serde_json::json!({"name": name, "ph": "X", "ts": at * 1e3, "dur": ms * 1e3, "pid": 1, "tid": 1}));
         if name == "compute" {
             let mut inner = at;
