@@ -99,6 +99,8 @@ impl Bench {
     pub fn run(&mut self, graph: &Graph, plan: Plan, inputs: &dyn Fn(&str) -> Tensor) -> Result<Values, String> {
         let held: Vec<(String, Vec<u8>)> = graph.inputs().map(|(n, ty)| (n.to_owned(), bytes(&inputs(n), &ty))).collect();
         let given: HashMap<&str, &[u8]> = held.iter().map(|(n, b)| (n.as_str(), b.as_slice())).collect();
+        // Every graph is a first frame.
+        self.executor.forget();
         let prepared = self.executor.prepare(Arc::new(plan)).map_err(|e| e.to_string())?;
         let outputs = self.executor.run(&prepared, &given, &RunOptions::default()).map_err(|e| e.to_string())?;
         self.executor.release(prepared);

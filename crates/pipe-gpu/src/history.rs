@@ -5,15 +5,15 @@
 
 use std::collections::{HashMap, VecDeque};
 
-use pipe_plan::plan::Plan;
+use pipe_plan::plan::{Plan, Storage};
 
 use crate::device::Device;
 use crate::error::GpuError;
 use crate::storage::{Memory, allocate};
 
-/// Earlier values, the newest last.
+/// Earlier values, the newest last, with the storage that they have.
 #[derive(Default)]
-pub(crate) struct Histories(HashMap<String, VecDeque<Memory>>);
+pub(crate) struct Histories(HashMap<String, (Storage, VecDeque<Memory>)>);
 
 impl Histories {
     /// Fills the slots of histories with the values of `delay` frames ago, with zeros where there are none yet.
@@ -24,7 +24,8 @@ impl Histories {
         let mut encoder = device.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
         for history in &plan.histories {
             let Some(slot) = history.recall.and_then(|slot| memory.get(slot.0 as usize)) else { continue };
-            let ring = self.0.get(&history.name);
+            let storage = history.recall.map(|slot| plan.slots[slot.0 as usize].storage);
+            let ring = self.0.get(&history.name).filter(|(of, _)| Some(*of) == storage).map(|(_, ring)| ring);
             let old = ring.and_then(|ring| ring.get(ring.len().checked_sub(history.delay as usize)?));
             match old {
                 Some(old) => old.copy_to(slot, &mut encoder),
@@ -44,7 +45,13 @@ impl Histories {
         let mut encoder = device.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
         for history in &plan.histories {
             let at = history.keep.0 as usize;
-            let ring = self.0.entry(history.name.clone()).or_default();
+            let storage = plan.slots[at].storage;
+            let (of, ring) = self.0.entry(history.name.clone()).or_insert_with(|| (storage, VecDeque::new()));
+            if *of != storage {
+                // Frames of another size: what was kept says nothing about them.
+                ring.clear();
+                *of = storage;
+            }
             let oldest = if ring.len() >= history.delay.max(1) as usize { ring.pop_front() } else { None };
             let kept = match oldest {
                 Some(memory) => memory,
