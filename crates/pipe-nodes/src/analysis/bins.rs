@@ -59,16 +59,22 @@ pub(crate) struct Binning {
 /// Most bins that are counted in workgroup memory: 16 KiB.
 const PRIVATE: u32 = 4096;
 
+/// Lanes that count in columns of their own.
+const LANES: u32 = 16;
+
 /// How many pixels fall in each bin: a table of u32.
 pub(crate) fn count(cx: &mut Lowering<'_>, suffix: &str, image: ResourceId, binning: &Binning) -> ResourceId {
     let size = cx.image_of(image).size;
-    let walk = match cx.limits().profile {
-        Profile::Gpu => Walk::tiles(size, [16, 16], [64, 64]),
-        Profile::Cpu => Walk::tiles(size, [64, 1], [256, 64]),
-    };
     let counts = cx.intermediate(suffix, Shape::uints(binning.bins));
+    // A lane of a CPU counts in its own column while the columns fit.
+    let columns = cx.limits().profile == Profile::Cpu && binning.bins * LANES <= PRIVATE;
+    let (walk, shader) = match cx.limits().profile {
+        Profile::Gpu => (Walk::tiles(size, [16, 16], [64, 64]), shader!("analysis/histogram")),
+        Profile::Cpu if columns => (Walk::tiles(size, [LANES, 1], [256, 64]), shader!("analysis/histogram_lanes")),
+        Profile::Cpu => (Walk::tiles(size, [64, 1], [256, 64]), shader!("analysis/histogram")),
+    };
     let pass = cx
-        .pass(suffix, shader!("analysis/histogram"))
+        .pass(suffix, shader)
         .entry(Entry::Kernel)
         .read("image", image, Reach::Whole)
         .write_as("counts", counts, Access::Atomic, None)
