@@ -190,7 +190,7 @@ impl Resolver<'_> {
             }
         }
         self.check_feedbacks();
-        self.check_settings();
+        self.check_settings(document);
         let dag = std::mem::take(&mut self.level().dag);
         let sinks = usage::sinks(&dag);
         if document.outputs.is_empty() && sinks.is_empty() && !self.means_to_read_back(document) {
@@ -346,8 +346,9 @@ impl Resolver<'_> {
         }
     }
 
-    fn check_settings(&mut self) {
-        let known: Vec<String> = self.level().dag.node_weights().map(|i| i.name.clone()).collect();
+    fn check_settings(&mut self, document: &Document) {
+        let nodes = self.level().dag.node_weights().map(|i| i.name.clone());
+        let known: Vec<String> = document.params.iter().map(|p| p.name.value.clone()).chain(nodes).collect();
         for setting in std::mem::take(&mut self.settings) {
             if !setting.used {
                 let d = Diagnostic::error(setting.value.span, format!("--set {}: there is no such parameter or node", setting.name));
