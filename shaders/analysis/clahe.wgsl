@@ -2,7 +2,7 @@
 //
 // Constants: TILES_X, TILES_Y, BINS, GREY.
 
-import package::lib::number::is_nan;
+import package::lib::number::is_finite;
 import package::lib::wide::{place_in_bins, wide_luminance};
 
 /// A place in a bin through the curve of a tile: straight inside a bin.
@@ -18,7 +18,7 @@ fn level(tile: vec2i, bin: i32, inside: f32) -> f32 {
 fn apply(image: vec4f) -> vec4f {
     let luminance = wide_luminance(image.rgb);
     let y = luminance.x;
-    if is_nan(y) {
+    if !is_finite(y) {
         return image;
     }
     var place = place_in_bins(luminance, params.low, params.high, BINS);

@@ -129,8 +129,8 @@ fn bin_index(v: vec2f, lo: f32, hi: f32, bins: i32) -> i32 {
     return i32(place_in_bins(v, lo, hi, bins).x);
 }
 
-/// The bin that a pixel falls in, or −1. Channel 0 is the luminance, 1 to 4 are R, G, B, A. NaN falls in none; what
-/// lies outside lo..hi falls in the first or last bin when `clamped`.
+/// The bin that a pixel falls in, or −1. Channel 0 is the luminance, 1 to 4 are R, G, B, A. NaN and infinity fall in
+/// none; what else lies outside lo..hi falls in the first or last bin when `clamped`.
 fn bin_of_pixel(c: vec4f, channel: i32, lo: f32, hi: f32, bins: i32, clamped: bool) -> i32 {
     var v = vec2f(c.a, 0.0);
     if channel == 0 {
@@ -138,7 +138,7 @@ fn bin_of_pixel(c: vec4f, channel: i32, lo: f32, hi: f32, bins: i32, clamped: bo
     } else if channel < 4 {
         v = vec2f(c[channel - 1], 0.0);
     }
-    if (bitcast<u32>(v.x) & 0x7fffffffu) > 0x7f800000u {
+    if (bitcast<u32>(v.x) & 0x7f800000u) == 0x7f800000u {
         return -1;
     }
     let k = bin_index(v, lo, hi, bins);
@@ -174,7 +174,7 @@ fn quick_bin_of_pixel(c: vec4f, channel: i32, lo: f32, hi: f32, bins: i32, clamp
     // Black is common, and no rounding stands between it and the first edge.
     let sure = (rest >= margin && rest <= 1.0 - margin) || (v == lo && slack == 0.0) || abs(t) > 2.0 * n + 2.0;
     k = select(-2, k, sure && lo < hi);
-    return select(k, -1, (bitcast<u32>(v) & 0x7fffffffu) > 0x7f800000u);
+    return select(k, -1, (bitcast<u32>(v) & 0x7f800000u) == 0x7f800000u);
 }
 
 /// a·b as (low word, high word).

@@ -105,10 +105,10 @@ impl Binning {
         counts
     }
 
-    /// The bin of a value.
+    /// The bin of a value; none for NaN and infinity.
     pub(crate) fn bin(&self, v: f64, low: f64, high: f64) -> Option<usize> {
         let last = self.bins as usize - 1;
-        if v.is_nan() || (self.outside == Outside::Ignore && !(low..=high).contains(&v)) {
+        if !v.is_finite() || (self.outside == Outside::Ignore && !(low..=high).contains(&v)) {
             return None;
         }
         // The cast saturates: below the first bin is 0.
@@ -136,7 +136,7 @@ mod tests {
     fn bins_are_half_open_but_the_last() {
         let mut binning = Binning { bins: 4, low: Value::F32(0.0), high: Value::F32(1.0), channel: Channel::R, outside: Outside::Clamp };
         let bins = |b: &Binning| [-0.1, 0.0, 0.2499, 0.25, 0.75, 1.0, 1.5, f64::INFINITY, f64::NAN].map(|v| b.bin(v, 0.0, 1.0));
-        assert_eq!(bins(&binning), [Some(0), Some(0), Some(0), Some(1), Some(3), Some(3), Some(3), Some(3), None]);
+        assert_eq!(bins(&binning), [Some(0), Some(0), Some(0), Some(1), Some(3), Some(3), Some(3), None, None]);
         binning.outside = Outside::Ignore;
         assert_eq!(bins(&binning), [None, Some(0), Some(0), Some(1), Some(3), Some(3), None, None, None]);
     }
