@@ -14,6 +14,7 @@ mod importance;
 mod laplacian;
 mod median;
 mod morphology;
+mod pyramid;
 mod recursive;
 mod selection_network;
 mod sobel;
