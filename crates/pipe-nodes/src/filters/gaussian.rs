@@ -2,7 +2,7 @@
 
 use pipe_graph::prelude::*;
 
-use crate::filters::recursive::recursive;
+use crate::filters::recursive::recursive_axis;
 use crate::shader;
 
 /// The radius beyond which the Gaussian is cut: ceil(3σ).
@@ -57,25 +57,46 @@ pub(super) fn convolve(cx: &mut Lowering<'_>, suffix: &str, axis: Axis, weights:
 /// Pixels below each other that one thread of a column filter makes.
 const ROWS: u32 = 8;
 
-/// A separable blur of `image` into `out`.
-pub(super) fn separable(cx: &mut Lowering<'_>, prefix: &str, sigma: [f32; 2], image: ResourceId, out: ResourceId) {
-    let (wx, wy) = (weights(sigma[0], radius(sigma[0])), weights(sigma[1], radius(sigma[1])));
-    let shape = cx.shape(out);
-    let rows = cx.intermediate(&format!("{prefix}rows"), shape);
-    convolve(cx, &format!("{prefix}rows"), Axis::X, &wx, image, rows);
-    convolve(cx, &format!("{prefix}columns"), Axis::Y, &wy, rows, out);
+/// Weights that are within 1e-4 of the unbounded Gaussian: cut at 4σ.
+pub(super) fn wide_weights(sigma: f32) -> Vec<f64> {
+    weights(sigma, (4.0 * sigma).ceil() as u32)
 }
 
-/// The radius up to which two convolutions are faster than the recursive filter, whose cost does not depend on σ.
+/// Declares a blur by its two axes; `axis` declares one of them.
+pub(super) fn both_axes(
+    cx: &mut Lowering<'_>,
+    prefix: &str,
+    sigma: [f32; 2],
+    [image, out]: [ResourceId; 2],
+    axis: impl Fn(&mut Lowering<'_>, &str, Axis, f32, [ResourceId; 2]),
+) {
+    let shape = cx.shape(out);
+    let rows = cx.intermediate(&format!("{prefix}rows"), shape);
+    axis(cx, &format!("{prefix}rows"), Axis::X, sigma[0], [image, rows]);
+    axis(cx, &format!("{prefix}columns"), Axis::Y, sigma[1], [rows, out]);
+}
+
+fn exact_axis(cx: &mut Lowering<'_>, suffix: &str, axis: Axis, sigma: f32, [image, out]: [ResourceId; 2]) {
+    convolve(cx, suffix, axis, &weights(sigma, radius(sigma)), image, out);
+}
+
+/// A separable blur of `image` into `out`.
+pub(super) fn separable(cx: &mut Lowering<'_>, prefix: &str, sigma: [f32; 2], image: ResourceId, out: ResourceId) {
+    both_axes(cx, prefix, sigma, [image, out], exact_axis);
+}
+
+/// The radius up to which a convolution is faster than the recursive filter, whose cost does not depend on σ.
 const SEPARABLE_UP_TO: u32 = 24;
 
-/// The fastest Gaussian blur of `image` into `out`: exact while σ is small, recursive beyond.
+/// The fastest Gaussian blur of `image` into `out`: along each axis exact while σ is small, recursive beyond.
 pub(super) fn blur(cx: &mut Lowering<'_>, prefix: &str, sigma: [f32; 2], image: ResourceId, out: ResourceId) {
-    if sigma.iter().all(|s| radius(*s) <= SEPARABLE_UP_TO) {
-        separable(cx, prefix, sigma, image, out);
-    } else {
-        recursive(cx, prefix, sigma, image, out);
-    }
+    both_axes(cx, prefix, sigma, [image, out], |cx, suffix, axis, sigma, ends| {
+        if radius(sigma) <= SEPARABLE_UP_TO {
+            exact_axis(cx, suffix, axis, sigma, ends);
+        } else {
+            recursive_axis(cx, suffix, axis, sigma, ends);
+        }
+    });
 }
 
 /// The twin of a one-dimensional convolution.
@@ -96,6 +117,12 @@ pub(super) fn convolve_reference(image: &Raster, axis: Axis, weights: &[f64], bo
         }
         sum
     })
+}
+
+/// The Gaussian itself, cut only where it is below 1e-14: what `Recursive` and `Pyramid` approximate.
+pub(super) fn unbounded_reference(image: &Raster, sigma: [f32; 2], border: Border) -> Raster {
+    let [wx, wy] = sigma.map(|s| weights(s, (8.0 * s).ceil() as u32));
+    convolve_reference(&convolve_reference(image, Axis::X, &wx, border), Axis::Y, &wy, border)
 }
 
 /// The twin of a separable blur.
