@@ -287,20 +287,22 @@ pub fn read(source: &Source, limits: &Limits) -> Result<Volume> {
 }
 
 fn open(source: &Source, bytes: &[u8], limits: &Limits) -> Result<(VolumeFormat, Opened)> {
-    let raw = source.path.as_deref().and_then(VolumeFormat::of_name) == Some(VolumeFormat::Raw);
-    let sniffed = if raw { Some(VolumeFormat::Raw) } else { VolumeFormat::sniff(bytes) };
-    let format = sniffed.ok_or_else(|| Error::UnknownFormat {
+    let part = source.layer.as_deref();
+    if source.path.as_deref().and_then(VolumeFormat::of_name) == Some(VolumeFormat::Raw) {
+        let form = part.and_then(raw::Form::parse).ok_or_else(|| Error::argument(source.to_string(), raw::Form::EXPECTED))?;
+        let opened = raw::open(form, limits).map_err(|fault| fault.named(source, VolumeFormat::Raw.name()))?;
+        return Ok((VolumeFormat::Raw, opened));
+    }
+    let format = VolumeFormat::sniff(bytes).ok_or_else(|| Error::UnknownFormat {
         file: source.to_string(),
         what: "volume",
         known: format!("{}; raw voxels are read as file.raw#WxHxD:TYPE", VolumeFormat::ALL.map(VolumeFormat::name).join(", ")),
     })?;
-    let part = source.layer.as_deref();
     let opened = shielded(|| match (format, part) {
-        (VolumeFormat::Raw, _) => raw::open(part, limits),
         (VolumeFormat::Nifti, _) => nifti::open(bytes, part, limits),
         (_, Some(part)) => Err(Fault::NoSuchLayer { wanted: part.to_owned(), available: format!("none, being a {} file", format.name()) }),
         (VolumeFormat::Nrrd, None) => nrrd::open(bytes, limits),
-        (VolumeFormat::Npy, None) => numpy::open(bytes, limits),
+        (_, None) => numpy::open(bytes, limits),
     });
     Ok((format, opened.map_err(|fault| fault.named(source, format.name()))?))
 }

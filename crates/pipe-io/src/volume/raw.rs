@@ -18,20 +18,38 @@ const TYPES: [(&str, Stored); 11] = [
     ("f64", Stored::F64),
 ];
 
-/// Reads `181x217x181:u8`: the size, channels as a fourth number, and the type, `be` behind it for big-endian.
-pub(super) fn open(part: Option<&str>, limits: &Limits) -> Result<Opened, Fault> {
-    let expected = "say its size and type as file.raw#WxHxD:TYPE, such as #181x217x181:u8 (types u8 i8 u16 i16 u32 i32 u64 i64 f16 f32 f64, \
-                    with `be` behind it when big-endian; channels as a fourth number)";
-    let unknown = || Fault::unsupported(expected);
-    let (size, kind) = part.and_then(|part| part.split_once(':').or(Some((part, "u8")))).ok_or_else(unknown)?;
-    let (kind, big_endian) = kind.strip_suffix("be").map_or((kind, false), |kind| (kind, true));
-    let (_, stored) = TYPES.into_iter().find(|(name, _)| *name == kind).ok_or_else(unknown)?;
-    let numbers: Option<Vec<u64>> = size.split('x').map(|n| n.parse().ok()).collect();
-    let (declared, channels) = match numbers.as_deref() {
-        Some(&[x, y, z]) => ([x, y, z], 1),
-        Some(&[x, y, z, channels @ 1..=4]) => ([x, y, z], channels),
-        _ => return Err(unknown()),
-    };
+/// What the user says of a raw file.
+#[derive(Clone, Copy)]
+pub(super) struct Form {
+    declared: [u64; 3],
+    channels: u64,
+    stored: Stored,
+    big_endian: bool,
+}
+
+impl Form {
+    /// What [`Form::parse`] would have understood.
+    pub(super) const EXPECTED: &str = "a raw volume of known size: write file.raw#WxHxD:TYPE, such as #181x217x181:u8 \
+         (u8 i8 u16 i16 u32 i32 u64 i64 f16 f32 f64, big-endian with `be` behind it; channels as a fourth number)";
+
+    /// Reads `181x217x181:u8`: the size, channels as a fourth number, and the type, `be` behind it for big-endian.
+    pub(super) fn parse(part: &str) -> Option<Self> {
+        let (size, kind) = part.split_once(':').unwrap_or((part, "u8"));
+        let (kind, big_endian) = kind.strip_suffix("be").map_or((kind, false), |kind| (kind, true));
+        let (_, stored) = TYPES.into_iter().find(|(name, _)| *name == kind)?;
+        let numbers: Option<Vec<u64>> = size.split('x').map(|n| n.parse().ok()).collect();
+        let (declared, channels) = match *numbers?.as_slice() {
+            [x, y, z] => ([x, y, z], 1),
+            [x, y, z, channels @ 1..=4] => ([x, y, z], channels),
+            _ => return None,
+        };
+        Some(Self { declared, channels, stored, big_endian })
+    }
+}
+
+/// The voxels of a file of this form.
+pub(super) fn open(part: Form, limits: &Limits) -> Result<Opened, Fault> {
+    let Form { declared, channels, stored, big_endian } = part;
     let size = checked_size(declared, channels, stored, limits)?;
     let header = VolumeHeader::new(VolumeFormat::Raw, size, channels as u8, stored);
     Ok(Opened { header, stored, big_endian, detached: None, start: 0, gzip: false, skip: Some(0), z_fastest: false })
