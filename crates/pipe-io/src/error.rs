@@ -36,10 +36,12 @@ pub enum Error {
         advice: &'static str,
     },
     /// The first bytes belong to no format this crate reads.
-    #[error("`{file}` is no image this program knows: its first bytes match none of {known}; convert it to one of these")]
+    #[error("`{file}` is no {what} this program knows: its first bytes match none of {known}; convert it to one of these")]
     UnknownFormat {
         /// The file as the user named it.
         file: String,
+        /// What it should have been: an image, a volume.
+        what: &'static str,
         /// The formats that are known.
         known: String,
     },
@@ -160,10 +162,15 @@ impl Fault {
         Self::Unsupported(reason.to_string())
     }
 
+    /// Names the file and the format of its image.
+    pub(crate) fn of(self, file: impl fmt::Display, format: Format) -> Error {
+        self.named(file, format.name())
+    }
+
     /// Names the file and its format.
     #[allow(clippy::needless_pass_by_value)] // called with temporaries throughout
-    pub(crate) fn of(self, file: impl fmt::Display, format: Format) -> Error {
-        let (file, format) = (file.to_string(), format.name());
+    pub(crate) fn named(self, file: impl fmt::Display, format: &'static str) -> Error {
+        let file = file.to_string();
         match self {
             Self::Damaged(reason) => Error::Damaged { file, format, reason },
             Self::Unsupported(reason) => Error::Unsupported { file, format, reason },

@@ -144,6 +144,6 @@ fn recognise(source: &Source, bytes: &[u8]) -> Result<Format> {
             format: source.path.as_deref().and_then(Format::of_extension).map_or("image", Format::name),
             reason: "it is empty".to_owned(),
         },
-        _ => Error::UnknownFormat { file: source.to_string(), known: Format::known_names() },
+        _ => Error::UnknownFormat { file: source.to_string(), what: "image", known: Format::known_names() },
     })
 }

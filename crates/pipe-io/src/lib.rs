@@ -1,4 +1,4 @@
-//! Images and tables between files and host memory.
+//! Images, volumes, tables and meshes between files and host memory.
 //!
 //! No GPU, no terminal, no environment. The crate decodes to the file's own sample type and says what the numbers mean
 //! ([`Picture`], [`Colour`]); the GPU's first kernel converts. The other way round [`output_form`] says in which form
@@ -30,6 +30,7 @@ mod form;
 mod guard;
 mod icc;
 mod input;
+pub mod mesh;
 mod npy;
 mod output;
 mod picture;
@@ -41,6 +42,7 @@ pub mod sequence;
 mod source;
 pub mod table;
 mod tiff;
+pub mod volume;
 
 pub use self::colour::{Colorspace, Colour, Primaries, Transfer};
 pub use self::error::{Error, Result};

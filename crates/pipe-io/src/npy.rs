@@ -1,4 +1,4 @@
-//! NumPy's array format (NEP 1), versions 1 to 3: images in, tables both ways.
+//! NumPy's array format (NEP 1), versions 1 to 3: images and volumes in, tables both ways.
 //!
 //! The header is a Python dictionary literal. `numpy` always writes its three keys as
 //! `{'descr': '<f4', 'fortran_order': False, 'shape': (3, 4), }`, in any order; nothing more of Python is understood.
@@ -9,7 +9,9 @@ use crate::error::Fault;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Element {
     U8,
+    I8,
     U16,
+    I16,
     U32,
     I32,
     F16,
@@ -20,8 +22,8 @@ pub(crate) enum Element {
 impl Element {
     pub(crate) const fn bytes(self) -> usize {
         match self {
-            Self::U8 => 1,
-            Self::U16 | Self::F16 => 2,
+            Self::U8 | Self::I8 => 1,
+            Self::U16 | Self::I16 | Self::F16 => 2,
             Self::U32 | Self::I32 | Self::F32 => 4,
             Self::F64 => 8,
         }
@@ -30,7 +32,9 @@ impl Element {
     const fn code(self) -> &'static str {
         match self {
             Self::U8 => "u1",
+            Self::I8 => "i1",
             Self::U16 => "u2",
+            Self::I16 => "i2",
             Self::U32 => "u4",
             Self::I32 => "i4",
             Self::F16 => "f2",
@@ -43,11 +47,13 @@ impl Element {
 /// An array within a file.
 pub(crate) struct Array<'a> {
     pub(crate) element: Element,
-    big_endian: bool,
-    /// Slowest axis first.
+    pub(crate) big_endian: bool,
+    /// Slowest axis first, or last in Fortran order.
     pub(crate) shape: Vec<usize>,
+    /// Whether the first axis is the fastest in memory.
+    pub(crate) fortran: bool,
     /// All bytes after the header; may be longer or shorter than the shape asks for.
-    rest: &'a [u8],
+    pub(crate) rest: &'a [u8],
 }
 
 impl<'a> Array<'a> {
@@ -65,17 +71,15 @@ impl<'a> Array<'a> {
 
         let code = value_of(text, "descr")
             .and_then(quoted)
-            .ok_or_else(|| Fault::unsupported("an array of records; save one plain array of u1, u2, u4, i4, f2, f4 or f8"))?;
-        let all = [Element::U8, Element::U16, Element::U32, Element::I32, Element::F16, Element::F32, Element::F64];
+            .ok_or_else(|| Fault::unsupported("an array of records; save one plain array of u1, i1, u2, i2, u4, i4, f2, f4 or f8"))?;
+        let all =
+            [Element::U8, Element::I8, Element::U16, Element::I16, Element::U32, Element::I32, Element::F16, Element::F32, Element::F64];
         let (order, code_only) = code.split_at_checked(1).unwrap_or(("", ""));
         let element = all
             .into_iter()
             .find(|element| element.code() == code_only && matches!(order, "<" | ">" | "|" | "="))
-            .ok_or_else(|| Fault::unsupported(format!("elements of type `{code}`; use u1, u2, u4, i4, f2, f4 or f8")))?;
-        let fortran = value_of(text, "fortran_order").ok_or_else(|| Fault::damaged("it has no `fortran_order`"))?;
-        if fortran.starts_with("True") {
-            return Err(Fault::unsupported("Fortran order; save it with numpy.ascontiguousarray"));
-        }
+            .ok_or_else(|| Fault::unsupported(format!("elements of type `{code}`; use u1, i1, u2, i2, u4, i4, f2, f4 or f8")))?;
+        let fortran = value_of(text, "fortran_order").ok_or_else(|| Fault::damaged("it has no `fortran_order`"))?.starts_with("True");
         let shape = value_of(text, "shape")
             .and_then(|value| value.strip_prefix('(')?.split_once(')'))
             .ok_or_else(|| Fault::damaged("it has no `shape`"))?
@@ -83,7 +87,7 @@ impl<'a> Array<'a> {
         let axes = shape.split(',').map(str::trim).filter(|axis| !axis.is_empty());
         let shape: Result<Vec<usize>, _> = axes.map(str::parse).collect();
         let shape = shape.map_err(|_| Fault::damaged("its `shape` is no list of numbers"))?;
-        Ok(Self { element, big_endian: order == ">", shape, rest: &bytes[end..] })
+        Ok(Self { element, big_endian: order == ">", shape, fortran, rest: &bytes[end..] })
     }
 
     /// Number of elements; `None` where that overflows.
@@ -91,8 +95,11 @@ impl<'a> Array<'a> {
         self.shape.iter().try_fold(1_usize, |product, &axis| product.checked_mul(axis))
     }
 
-    /// The elements in native byte order.
+    /// The elements in native byte order, the last axis fastest.
     pub(crate) fn native(&self) -> Result<Vec<u8>, Fault> {
+        if self.fortran && self.shape.len() > 1 {
+            return Err(Fault::unsupported("Fortran order; save it with numpy.ascontiguousarray"));
+        }
         let size = self.element.bytes();
         let wanted = self.count().and_then(|count| count.checked_mul(size));
         let data = wanted.and_then(|wanted| self.rest.get(..wanted)).ok_or_else(|| Fault::damaged("it is shorter than its shape says"))?;
@@ -117,7 +124,7 @@ fn quoted(value: &str) -> Option<&str> {
 
 /// A version 1.0 header for little-endian elements; data follows at a multiple of 64 bytes.
 pub(crate) fn header(element: Element, shape: &[usize]) -> Vec<u8> {
-    let order = if element == Element::U8 { '|' } else { '<' };
+    let order = if element.bytes() == 1 { '|' } else { '<' };
     let axes: Vec<String> = shape.iter().map(ToString::to_string).collect();
     // Python writes a tuple of one as `(3,)` and of two as `(3, 4)`.
     let axes = axes.join(", ") + if shape.len() == 1 { "," } else { "" };

@@ -83,8 +83,8 @@ fn npy_shape<'a>(bytes: &'a [u8], limits: &Limits) -> Result<(Header, Array<'a>)
         Element::U16 => Sample::U16,
         Element::F16 => Sample::F16,
         Element::F32 | Element::F64 => Sample::F32,
-        Element::U32 | Element::I32 => {
-            return Err(Fault::unsupported("an image of 32-bit integers; save it as float"));
+        Element::I8 | Element::I16 | Element::U32 | Element::I32 => {
+            return Err(Fault::unsupported("an image of signed or 32-bit integers; save it as float"));
         }
     };
     let (height, width, count) = match *array.shape.as_slice() {

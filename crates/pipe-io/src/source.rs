@@ -11,6 +11,7 @@ use std::io::{self, Read};
 use std::path::{Path, PathBuf};
 
 use crate::error::{Error, Fault, Result};
+use crate::volume::VolumeFormat;
 
 /// A file format for images.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -149,7 +150,7 @@ impl Limits {
 pub struct Source {
     /// The file; `None` is the standard input.
     pub path: Option<PathBuf>,
-    /// The layer, part, view or channel after the `#`.
+    /// The layer, part, view or channel after the `#`; the size and type of a raw volume.
     pub layer: Option<String>,
 }
 
@@ -159,7 +160,7 @@ impl Source {
     pub fn parse(text: &str) -> Self {
         let at_known_extension = |at: usize| {
             let path = &text[..at];
-            path == "-" || Format::of_extension(Path::new(path)).is_some()
+            path == "-" || Format::of_extension(Path::new(path)).is_some() || VolumeFormat::of_name(Path::new(path)).is_some()
         };
         let split = text.match_indices('#').map(|(at, _)| at).find(|&at| at_known_extension(at));
         let (path, layer) = match split {
@@ -255,6 +256,8 @@ mod tests {
         assert_eq!(parts("in.####.exr"), (path("in.####.exr"), None));
         assert_eq!(parts("in.####.EXR#left.N"), (path("in.####.EXR"), path("left.N")));
         assert_eq!(parts("a#b"), (path("a#b"), None));
+        assert_eq!(parts("fog.raw#9x8x7:u8"), (path("fog.raw"), path("9x8x7:u8")));
+        assert_eq!(parts("fmri.nii.gz#3"), (path("fmri.nii.gz"), path("3")));
         assert_eq!(parts("-"), (None, None));
         assert_eq!(parts("-#Z"), (None, path("Z")));
     }

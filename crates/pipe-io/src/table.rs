@@ -145,6 +145,8 @@ fn read_npy(array: &Array<'_>) -> std::result::Result<Table, crate::error::Fault
     Ok(match array.element {
         Element::U8 => Table::Uint(bytes.iter().copied().map(u32::from).collect()),
         Element::U16 => Table::Uint(bytes.as_chunks::<2>().0.iter().map(|&two| u16::from_ne_bytes(two).into()).collect()),
+        Element::I8 => Table::Float(bytes.iter().map(|&byte| f32::from(byte as i8)).collect()),
+        Element::I16 => Table::Float(bytes.as_chunks::<2>().0.iter().map(|&two| i16::from_ne_bytes(two).into()).collect()),
         Element::U32 => Table::Uint(words.map(u32::from_ne_bytes).collect()),
         Element::I32 => Table::Float(words.map(|four| i32::from_ne_bytes(four) as f32).collect()),
         Element::F16 => {

@@ -10,7 +10,7 @@ use pipe_graph::graph::{Graph, Instance, Iteration, Times, ValueRef, Work};
 use pipe_graph::lowering::{Carried, Lowering, Site};
 use pipe_graph::node::{FileSource, Mistake, Output};
 use pipe_graph::pass::{Border, Count, Filter, Item, Limits, Loop, NodeLabel, Origin, PassGraph, Resource, ResourceId, Shape, State};
-use pipe_graph::rim::{self, PixelForm};
+use pipe_graph::rim::{self, PixelForm, VoxelForm};
 use pipe_graph::types::{EdgeType, ImageType};
 
 use crate::PlanError;
@@ -20,6 +20,8 @@ use crate::PlanError;
 pub struct Rim {
     /// Pixels of graph inputs, by name, and of files that nodes read, by [`file_name`]; linear floats when absent.
     pub inputs: IndexMap<String, PixelForm>,
+    /// Voxels of volumes, by the same names; plain floats when absent.
+    pub volumes: IndexMap<String, VoxelForm>,
     /// Pixels wanted of image outputs; linear floats when absent.
     pub outputs: IndexMap<String, PixelForm>,
     /// More values to fetch (`--dump`), by the name they are asked by.
@@ -124,8 +126,9 @@ impl Lowerer<'_> {
                 id
             }
             EdgeType::Volume(t) => {
+                let form = self.rim.volumes.get(name).copied().unwrap_or(VoxelForm::plain(t.size, t.channels));
                 let mut cx = Lowering::new(&mut self.passes, &site);
-                let id = rim::ingest_volume(&mut cx, name, t);
+                let id = rim::ingest_volume(&mut cx, name, &form);
                 items.extend(cx.finish().0);
                 id
             }

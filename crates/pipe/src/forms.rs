@@ -1,6 +1,8 @@
 //! Between the words of `pipe-io` and those of the planner's rim.
 
-use pipe_graph::rim::{Alpha, Layout, PixelForm, Sample, Transfer};
+use pipe_graph::rim::{Alpha, Layout, PixelForm, Sample, Transfer, Voxel, VoxelForm};
+use pipe_graph::types::{Precision, VolumeType};
+use pipe_io::volume::VolumeHeader;
 use pipe_io::{Channels, Colour, Form, Picture};
 
 fn sample(s: pipe_io::Sample) -> Sample {
@@ -69,6 +71,31 @@ pub(crate) fn of_form(f: &Form, size: [u32; 2]) -> PixelForm {
         transfer: transfer(&f.colour),
         matrix: clean(f.colour.from_working_matrix()),
     }
+}
+
+fn voxel(v: pipe_io::volume::Voxel) -> Voxel {
+    use pipe_io::volume::Voxel as File;
+    match v {
+        File::U8 => Voxel::U8,
+        File::I8 => Voxel::I8,
+        File::U16 => Voxel::U16,
+        File::I16 => Voxel::I16,
+        File::U32 => Voxel::U32,
+        File::I32 => Voxel::I32,
+        File::F16 => Voxel::F16,
+        File::F32 => Voxel::F32,
+    }
+}
+
+/// How a decoded volume lies in memory.
+pub(crate) fn of_volume(header: &VolumeHeader) -> VoxelForm {
+    let VolumeHeader { size, channels, scale, offset, .. } = *header;
+    VoxelForm { size, channels, voxel: voxel(header.voxel), scale, offset }
+}
+
+/// The volume in the graph.
+pub(crate) fn volume_type(header: &VolumeHeader) -> VolumeType {
+    VolumeType { size: header.size, channels: of_volume(header).volume_channels(), precision: Precision::F32 }
 }
 
 /// A matrix within rounding of the identity is the identity, so that unchanged pixels stay so to the bit.

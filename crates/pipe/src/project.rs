@@ -39,7 +39,8 @@ impl Loader for World {
     }
 
     fn volume(&self, path: &Path) -> Result<VolumeType, String> {
-        Err(format!("{}: volume files cannot be read yet", path.display()))
+        let source = pipe_io::Source::parse(&path.to_string_lossy());
+        pipe_io::volume::probe(&source, &self.read.limits).map(|header| forms::volume_type(&header)).map_err(|e| e.to_string())
     }
 
     fn table(&self, path: &Path) -> Result<TableFile, String> {

@@ -4,20 +4,46 @@ use std::path::Path;
 
 use pipe_graph::node::{FileElement, ReadbackFile};
 use pipe_graph::types::{EdgeType, Element};
+use pipe_io::mesh::Mesh;
 use pipe_io::region::Samples;
 use pipe_io::table::Table;
+use pipe_io::volume::{Volume, Voxel};
 
 use crate::{Failure, plot};
 
-fn floats(bytes: &[u8]) -> Vec<f32> {
+pub(crate) fn floats(bytes: &[u8]) -> Vec<f32> {
     bytes.chunks_exact(4).map(|w| f32::from_le_bytes([w[0], w[1], w[2], w[3]])).collect()
 }
 
 fn table(bytes: &[u8], element: Element) -> Table {
     match element {
         Element::F32 => Table::Float(floats(bytes)),
-        Element::U32 => Table::Uint(bytes.chunks_exact(4).map(|w| u32::from_le_bytes([w[0], w[1], w[2], w[3]])).collect()),
+        Element::U32 => Table::Uint(uints(bytes)),
     }
+}
+
+fn uints(bytes: &[u8]) -> Vec<u32> {
+    bytes.chunks_exact(4).map(|w| u32::from_le_bytes([w[0], w[1], w[2], w[3]])).collect()
+}
+
+/// A mesh from its fetched parts, of which `counts` says how much is filled.
+pub(crate) fn mesh(name: &str, vertices: &[u8], triangles: &[u8], counts: &[u8]) -> Result<Mesh, Failure> {
+    let (room, counts) = ([vertices.len() as u32 / 24, triangles.len() as u32 / 12], uints(counts));
+    let [vertex_count, triangle_count] = [0, 1].map(|i| counts.get(i).copied().unwrap_or(0));
+    if vertex_count > room[0] || triangle_count > room[1] {
+        return Err(Failure::World(format!(
+            "the mesh `{name}` has {vertex_count} vertices and {triangle_count} triangles, but there is room for {} and {}\n  \
+             next: set `max_triangles` of the node to {triangle_count} or more",
+            room[0], room[1]
+        )));
+    }
+    let rows = floats(&vertices[..vertex_count as usize * 24]);
+    let corners = uints(&triangles[..triangle_count as usize * 12]);
+    Ok(Mesh {
+        vertices: rows.chunks_exact(6).map(|v| [v[0], v[1], v[2]]).collect(),
+        normals: rows.chunks_exact(6).map(|v| [v[3], v[4], v[5]]).collect(),
+        triangles: corners.chunks_exact(3).map(|t| [t[0], t[1], t[2]]).collect(),
+    })
 }
 
 /// The pixels of a region with the wanted channels only.
@@ -65,7 +91,11 @@ pub fn write(file: &ReadbackFile, bytes: &[u8]) -> Result<(), Failure> {
             let (w, h) = (t.size[0] as usize, t.size[1] as usize);
             write_region(path, w, h, channels, &values, file.element.unwrap_or_default())?;
         }
-        EdgeType::Volume(_) | EdgeType::Mesh(_) => {}
+        EdgeType::Volume(t) => {
+            let volume = Volume::of_floats(t.size, t.channels, [1.0; 3], &floats(bytes), Voxel::F32);
+            pipe_io::volume::write(path, &volume)?;
+        }
+        EdgeType::Mesh(_) => {}
     }
     Ok(())
 }

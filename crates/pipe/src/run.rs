@@ -3,6 +3,7 @@
 //! The device is opened while inputs are decoded. Outputs are written only when everything has run, each to a
 //! temporary file that is renamed at the end; so a run that fails leaves every old file as it was.
 
+use std::borrow::Cow;
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -15,8 +16,10 @@ use pipe_graph::graph::{Graph, Instance, Work};
 use pipe_graph::node::{FileSource, ReadbackFile};
 use pipe_graph::pass::Limits;
 use pipe_graph::resolve::Request;
-use pipe_graph::types::{EdgeKind, EdgeType, Element, ImageType};
+use pipe_graph::types::{EdgeKind, EdgeType, Element, ImageType, VolumeType};
+use pipe_io::mesh::Mesh;
 use pipe_io::table::Table;
+use pipe_io::volume::{Volume, VolumeHeader, Voxel};
 use pipe_io::{Channels, Metadata, Picture, ReadOptions, Source, Target, WriteOptions};
 use pipe_plan::lower::{Rim, file_name, lower, readback_name};
 use pipe_plan::{Options, Plan};
@@ -160,14 +163,17 @@ impl Report {
 pub enum Decoded {
     /// An image.
     Picture(Picture),
+    /// A volume.
+    Volume(Volume),
     /// A table.
     Table(Table),
 }
 
 impl Decoded {
-    fn bytes(&self) -> Vec<u8> {
+    fn bytes(&self) -> Cow<'_, [u8]> {
         match self {
-            Self::Picture(_) => Vec::new(),
+            Self::Picture(p) => Cow::Borrowed(&p.bytes),
+            Self::Volume(v) => Cow::Borrowed(&v.bytes),
             Self::Table(Table::Float(v)) => v.iter().flat_map(|v| v.to_le_bytes()).collect(),
             Self::Table(Table::Uint(v)) => v.iter().flat_map(|v| v.to_le_bytes()).collect(),
         }
@@ -176,6 +182,7 @@ impl Decoded {
     fn ty(&self) -> EdgeType {
         match self {
             Self::Picture(p) => EdgeType::Image(ImageType::new([p.width, p.height], forms::image_channels(p.channels))),
+            Self::Volume(v) => EdgeType::Volume(forms::volume_type(&v.header)),
             Self::Table(Table::Float(v)) => EdgeType::table(v.len() as u32, Element::F32),
             Self::Table(Table::Uint(v)) => EdgeType::table(v.len() as u32, Element::U32),
         }
@@ -191,7 +198,7 @@ pub fn decode(job: &Job, kinds: &HashMap<String, EdgeKind>) -> Result<Inputs, Fa
     for (name, file) in &job.inputs {
         let value = match kinds.get(name) {
             Some(EdgeKind::Table) => Decoded::Table(pipe_io::table::read(Path::new(file))?),
-            Some(EdgeKind::Volume) => return Err(Failure::World(format!("{file}: volume files cannot be read yet"))),
+            Some(EdgeKind::Volume) => Decoded::Volume(pipe_io::volume::read(&Source::parse(file), &job.read.limits)?),
             _ => Decoded::Picture(pipe_io::read(&Source::parse(file), &job.read)?),
         };
         inputs.insert(name.clone(), value);
@@ -202,6 +209,8 @@ pub fn decode(job: &Job, kinds: &HashMap<String, EdgeKind>) -> Result<Inputs, Fa
 /// What comes out of a run before it is written.
 pub struct Finished {
     images: Vec<(Target, Picture)>,
+    volumes: Vec<(PathBuf, Volume)>,
+    meshes: Vec<(PathBuf, Mesh)>,
     data: Vec<(ReadbackFile, Vec<u8>)>,
     /// What there is to say.
     pub report: Report,
@@ -215,6 +224,12 @@ impl Finished {
         for (target, picture) in &self.images {
             let options = WriteOptions { channels: Some(picture.channels), ..self.write.clone() };
             pipe_io::write(target, picture, &options)?;
+        }
+        for (path, volume) in &self.volumes {
+            pipe_io::volume::write(path, volume)?;
+        }
+        for (path, mesh) in &self.meshes {
+            pipe_io::mesh::write(path, mesh)?;
         }
         for (file, bytes) in &self.data {
             readback::write(file, bytes)?;
@@ -283,13 +298,8 @@ impl Session {
         self.prepare(&plan)?;
         let planned = millis(started);
 
-        let tables: HashMap<&str, Vec<u8>> = inputs.iter().map(|(n, d)| (n.as_str(), d.bytes())).collect();
-        let mut given: HashMap<&str, &[u8]> = tables.iter().map(|(n, b)| (*n, b.as_slice())).collect();
-        for (name, value) in inputs.iter().chain(&files) {
-            if let Decoded::Picture(p) = value {
-                given.insert(name, &p.bytes);
-            }
-        }
+        let held: HashMap<&str, Cow<'_, [u8]>> = inputs.iter().chain(&files).map(|(n, d)| (n.as_str(), d.bytes())).collect();
+        let given: HashMap<&str, &[u8]> = held.iter().map(|(n, b)| (*n, b.as_ref())).collect();
         let options = RunOptions { timeout: job.timeout, profile: job.profile, cancel, progress };
         let prepared = self.prepared.as_ref().expect("prepared above");
         let mut ran = self.executor.run(prepared, &given, &options)?;
@@ -318,18 +328,28 @@ impl Session {
                 data.push((file, bytes));
             }
         }
-        let mut images = Vec::new();
+        let (mut images, mut volumes, mut meshes) = (Vec::new(), Vec::new(), Vec::new());
         for output in outputs {
+            if let Packed::Mesh(path) = output.to {
+                let mut part = |part: &str| ran.fetched.shift_remove(&format!("{}.{part}", output.name)).unwrap_or_default();
+                let mesh = readback::mesh(&output.name, &part("vertices"), &part("triangles"), &part("counts"))?;
+                meshes.push((path, mesh));
+                continue;
+            }
             let Some(bytes) = ran.fetched.shift_remove(&output.name) else { continue };
             match output.to {
                 Packed::Image { target, form, size } => {
                     let metadata = output.metadata.unwrap_or_default();
                     images.push((target, form.picture(size[0], size[1], bytes, metadata)));
                 }
+                Packed::Volume { path, ty, spacing, voxel } => {
+                    volumes.push((path, Volume::of_floats(ty.size, ty.channels, spacing, &readback::floats(&bytes), voxel)));
+                }
+                Packed::Mesh(_) => unreachable!("taken above"),
                 Packed::Data(file) => data.push((file, bytes)),
             }
         }
-        Ok(Finished { images, data, report, write: job.write.clone() })
+        Ok(Finished { images, volumes, meshes, data, report, write: job.write.clone() })
     }
 
     fn prepare(&mut self, plan: &Arc<Plan>) -> Result<(), Failure> {
@@ -377,12 +397,14 @@ fn read_files(graph: &Graph, job: &Job) -> Result<Inputs, Failure> {
                 Work::Node(node) => {
                     let Some(source) = node.file() else { continue };
                     let name = file_name(&source);
-                    let FileSource::Image(path) = &source else {
-                        return Err(Failure::World("volume files cannot be read yet".into()));
-                    };
-                    if !files.contains_key(&name) {
-                        files.insert(name, Decoded::Picture(pipe_io::read(&Source::parse(path), &job.read)?));
+                    if files.contains_key(&name) {
+                        continue;
                     }
+                    let decoded = match &source {
+                        FileSource::Image(path) => Decoded::Picture(pipe_io::read(&Source::parse(path), &job.read)?),
+                        FileSource::Volume(path) => Decoded::Volume(pipe_io::volume::read(&Source::parse(path), &job.read.limits)?),
+                    };
+                    files.insert(name, decoded);
                 }
                 Work::Iterate(iteration) => open.push(&iteration.body),
                 _ => {}
@@ -401,6 +423,8 @@ struct Output {
 
 enum Packed {
     Image { target: Target, form: pipe_io::Form, size: [u32; 2] },
+    Volume { path: PathBuf, ty: VolumeType, spacing: [f32; 3], voxel: Voxel },
+    Mesh(PathBuf),
     Data(ReadbackFile),
 }
 
@@ -408,14 +432,15 @@ enum Packed {
 fn rim(job: &Job, graph: &Graph, inputs: &Inputs, files: &Inputs) -> Result<(Rim, Vec<Output>), Failure> {
     let mut rim = Rim { frames_before: job.frames_before, seed: job.seed, ..Rim::default() };
     for (name, value) in inputs.iter().chain(files) {
-        if let Decoded::Picture(p) = value {
-            rim.inputs.insert(name.clone(), forms::of_picture(p));
+        match value {
+            Decoded::Picture(p) => drop(rim.inputs.insert(name.clone(), forms::of_picture(p))),
+            Decoded::Volume(v) => drop(rim.volumes.insert(name.clone(), forms::of_volume(&v.header))),
+            Decoded::Table(_) => {}
         }
     }
-    let first = inputs.values().chain(files.values()).find_map(|d| match d {
-        Decoded::Picture(p) => Some(&p.metadata),
-        Decoded::Table(_) => None,
-    });
+    let all_inputs = || inputs.values().chain(files.values());
+    let first = all_inputs().find_map(|d| if let Decoded::Picture(p) = d { Some(&p.metadata) } else { None });
+    let first_volume = all_inputs().find_map(|d| if let Decoded::Volume(v) = d { Some(&v.header) } else { None });
     let mut outputs = Vec::new();
     let named = graph.outputs().map(|(n, v)| (n.to_owned(), v));
     let asked: Vec<_> = named.filter_map(|(n, v)| Some((job.outputs.get(&n)?.clone(), n, v))).collect();
@@ -447,13 +472,25 @@ fn rim(job: &Job, graph: &Graph, inputs: &Inputs, files: &Inputs) -> Result<(Rim
                 Packed::Image { target, form, size: t.size }
             }
             EdgeType::Table(_) | EdgeType::Scalar(_) => Packed::Data(ReadbackFile { path: file, element: None, channels: Vec::new(), ty }),
-            EdgeType::Volume(_) | EdgeType::Mesh(_) => {
-                return Err(Failure::Graph(format!("output `{name}` is {ty}, which cannot be written yet")));
+            EdgeType::Volume(ty) => {
+                let path = PathBuf::from(&file);
+                let voxel = pipe_io::volume::voxel_written(&path, job.write.pixel_type)?;
+                Packed::Volume { path, ty, spacing: spacing(ty.size, first_volume), voxel }
+            }
+            EdgeType::Mesh(_) => {
+                let path = PathBuf::from(&file);
+                pipe_io::mesh::MeshFormat::of(&path)?;
+                Packed::Mesh(path)
             }
         };
         outputs.push(Output { name, to, metadata: first.cloned() });
     }
     Ok((rim, outputs))
+}
+
+/// The distance between voxels of an output that extends as far as the input: resampling does not change the extent.
+fn spacing(size: [u32; 3], input: Option<&VolumeHeader>) -> [f32; 3] {
+    input.map_or([1.0; 3], |input| std::array::from_fn(|i| input.spacing[i] * input.size[i] as f32 / size[i] as f32))
 }
 
 /// Whether some node of the graph may make alpha other than 1 where the inputs had none.
@@ -499,8 +536,10 @@ fn first_size(graph: &Graph) -> Vec<u32> {
 pub fn make_plan(graph: &Graph, rim: &Rim, limits: &Limits, job: &Job) -> Result<Plan, Failure> {
     let mut passes = lower(graph, rim, limits)?;
     // An output that no file is bound to is not computed.
-    passes
-        .fetches
-        .retain(|f| rim.outputs.contains_key(&f.name) || !graph.outputs().any(|(n, _)| n == f.name) || job.outputs.contains_key(&f.name));
+    passes.fetches.retain(|f| {
+        // Of a mesh three parts are fetched, `NAME.vertices` and so on.
+        let name = f.name.split_once('.').map_or(f.name.as_str(), |(name, _)| name);
+        job.outputs.contains_key(name) || !graph.outputs().any(|(n, _)| n == name)
+    });
     Ok(pipe_plan::plan(&graph.name, passes, limits, &Options { fuse: job.fuse, budget: job.budget })?)
 }

@@ -34,6 +34,58 @@ impl Sample {
     }
 }
 
+/// The type of a stored voxel.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize)]
+#[allow(missing_docs)]
+pub enum Voxel {
+    U8,
+    I8,
+    U16,
+    I16,
+    U32,
+    I32,
+    F16,
+    F32,
+}
+
+impl Voxel {
+    /// Bytes of one number.
+    pub const fn bytes(self) -> u64 {
+        match self {
+            Self::U8 | Self::I8 => 1,
+            Self::U16 | Self::I16 | Self::F16 => 2,
+            Self::U32 | Self::I32 | Self::F32 => 4,
+        }
+    }
+}
+
+/// How the voxels of a volume lie in host memory: x fastest, the channels of a voxel together, without padding.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct VoxelForm {
+    /// Voxels along x, y and z.
+    pub size: [u32; 3],
+    /// 1 to 4. Two become (u, v, 0, 1), three have alpha 1.
+    pub channels: u8,
+    /// Type of the numbers.
+    pub voxel: Voxel,
+    /// Value = number × scale + offset.
+    pub scale: f32,
+    /// See `scale`.
+    pub offset: f32,
+}
+
+impl VoxelForm {
+    /// Floats that stand for themselves: what needs no conversion.
+    pub const fn plain(size: [u32; 3], channels: u8) -> Self {
+        Self { size, channels, voxel: Voxel::F32, scale: 1.0, offset: 0.0 }
+    }
+
+    /// Channels of the volume inside the graph.
+    pub const fn volume_channels(&self) -> u8 {
+        if self.channels == 1 { 1 } else { 4 }
+    }
+}
+
 /// Order of the samples.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize)]
 pub enum Layout {

@@ -5,10 +5,10 @@
 
 use std::ops::Range;
 
-use super::{Alpha, Layout, PixelForm, Sample, Transfer};
+use super::{Alpha, Layout, PixelForm, Sample, Transfer, Voxel, VoxelForm};
 use crate::lowering::{Lowering, PassBuilder};
 use crate::pass::{Access, Entry, Fetch, Grid, Origin, Reach, Resource, ResourceId, Shader, Shape};
-use crate::types::{ImageType, VolumeType};
+use crate::types::{ImageType, Precision, VolumeType};
 
 macro_rules! shader {
     ($path:literal, $tail:expr) => {
@@ -142,19 +142,38 @@ pub fn fetch_image(cx: &mut Lowering<'_>, name: &str, image: ResourceId, form: &
     cx.graph.fetches.push(Fetch { name: name.to_owned(), parts });
 }
 
-/// The volume of the external `name`: floats, x fastest.
-pub fn ingest_volume(cx: &mut Lowering<'_>, name: &str, volume: VolumeType) -> ResourceId {
-    let bytes = Shape::Volume(volume).bytes();
-    let origin = Origin::External { name: name.to_owned(), ranges: vec![0..bytes] };
-    let words = cx.graph.add(Resource { name: format!("{name}.file"), shape: words(&(0..bytes)), origin });
-    let out = cx.graph.add(Resource { name: name.to_owned(), shape: Shape::Volume(volume), origin: Origin::Pass });
-    cx.pass("decode", shader!("io/ingest_volume", ""))
-        .entry(Entry::At)
-        .constant("CHANNELS", i32::from(volume.channels))
-        .read("words", words, Reach::Whole)
-        .write("out", out)
-        .add();
-    out
+/// The volume of the external `name`, whose voxels lie in memory as `form` says. Large ones cross the rim in bands of
+/// slices, four at a time, so that every band begins at a whole word.
+pub fn ingest_volume(cx: &mut Lowering<'_>, name: &str, form: &VoxelForm) -> ResourceId {
+    let [w, h, depth] = form.size;
+    let shape = Shape::Volume(VolumeType { size: form.size, channels: form.volume_channels(), precision: Precision::F32 });
+    let slice = u64::from(w) * u64::from(h) * u64::from(form.channels) * form.voxel.bytes();
+    let most = (cx.limits().max_binding_bytes / slice / 4 * 4).clamp(4, u64::from(depth).max(4)) as u32;
+    let mut volume = None;
+    for first in (0..depth).step_by(most as usize) {
+        let end = (first + most).min(depth);
+        let range = u64::from(first) * slice..u64::from(end) * slice;
+        let origin = Origin::External { name: name.to_owned(), ranges: vec![range.clone()] };
+        let words = cx.graph.add(Resource { name: format!("{name}.file"), shape: words(&range), origin });
+        let out = cx.graph.add(Resource { name: name.to_owned(), shape, origin: Origin::Pass });
+        let tail = "fn each(xyz: vec3i) { store_out(xyz + vec3i(0, 0, FIRST_SLICE), decode(xyz)); }";
+        cx.pass("decode", shader!("io/ingest_volume", tail))
+            .entry(Entry::Each)
+            .constant("CHANNELS", i32::from(form.channels))
+            .constant("BYTES", form.voxel.bytes() as i32)
+            .constant("SIGNED", matches!(form.voxel, Voxel::I8 | Voxel::I16 | Voxel::I32))
+            .constant("FLOATING", matches!(form.voxel, Voxel::F16 | Voxel::F32))
+            .constant("SCALED", (form.scale, form.offset) != (1.0, 0.0))
+            .constant("FIRST_SLICE", first as i32)
+            .param("scale", form.scale)
+            .param("offset", form.offset)
+            .read("words", words, Reach::Whole)
+            .write_as("out", out, Access::Store, volume)
+            .grid(Grid::Elements([w, h, end - first]))
+            .add();
+        volume = Some(out);
+    }
+    volume.expect("a volume has slices")
 }
 
 /// Fetches a volume as floats, x fastest, under `name`.

@@ -22,5 +22,6 @@ pub(crate) const KINDS: &[Kind] = &[
     impulse::KIND,
     color_bars::KIND,
     read::READ_IMAGE,
+    read::READ_VOLUME,
     read::READ_TABLE,
 ];

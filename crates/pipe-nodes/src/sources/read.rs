@@ -1,4 +1,4 @@
-//! `ReadImage` and `ReadTable`: files as sources.
+//! `ReadImage`, `ReadVolume` and `ReadTable`: files as sources.
 
 use pipe_graph::prelude::*;
 
@@ -29,6 +29,47 @@ impl Node for ReadImage {
 
     fn file(&self) -> Option<FileSource> {
         self.found.as_ref().map(|(path, _)| FileSource::Image(path.clone()))
+    }
+
+    fn lower(&self, cx: &mut Lowering<'_>) -> Result<(), Mistake> {
+        let file = cx.file();
+        cx.emit("out", file);
+        Ok(())
+    }
+
+    fn reference(&self, cx: &Reference<'_>) -> Vec<Tensor> {
+        cx.file.cloned().into_iter().collect()
+    }
+}
+
+/// A volume file: NRRD, NIfTI, NPY, or raw voxels as `file.raw#181x217x181:u8`. Whole numbers of 8 and 16 unsigned bits stand
+/// for 0..1 unless the file scales them; other numbers stand for themselves.
+#[derive(Debug, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(default)]
+pub(super) struct ReadVolume {
+    /// Path, relative to the graph file. `file.nii#3` is a point in time of a series.
+    path: String,
+    #[serde(skip)]
+    found: Option<(String, VolumeType)>,
+}
+
+pub(super) const READ_VOLUME: Kind = Kind::of::<ReadVolume>("ReadVolume", Category::Sources, &[]);
+
+impl Node for ReadVolume {
+    fn open(&mut self, cx: &Opening<'_>) -> Result<(), Mistake> {
+        let path = cx.folder.join(&self.path);
+        let ty = cx.loader.volume(&path).map_err(|reason| Mistake::in_field("path", format!("cannot be read: {reason}")))?;
+        self.found = Some((path.to_string_lossy().into_owned(), ty));
+        Ok(())
+    }
+
+    fn outputs(&self, _: &mut Inputs<'_>) -> Result<Vec<Output>, Mistake> {
+        let (_, ty) = self.found.as_ref().ok_or_else(|| Mistake::new("was not opened"))?;
+        Ok(Output::out(EdgeType::Volume(*ty)))
+    }
+
+    fn file(&self) -> Option<FileSource> {
+        self.found.as_ref().map(|(path, _)| FileSource::Volume(path.clone()))
     }
 
     fn lower(&self, cx: &mut Lowering<'_>) -> Result<(), Mistake> {

@@ -178,7 +178,7 @@ pub(super) fn refuse_overwriting(job: &Job) -> Result<(), Failure> {
 /// Resolves with the sizes in the files' headers, where they can be read cheaply.
 fn check_early(project: &mut Project, job: &Job) -> Result<(), Failure> {
     for file in job.outputs.values() {
-        let data = ["csv", "json", "npy", "svg"].iter().any(|e| file.to_lowercase().ends_with(e));
+        let data = ["csv", "json", "npy", "svg", "nrrd", "raw", "obj", "ply"].iter().any(|e| file.to_lowercase().ends_with(e));
         if !data {
             Target::parse(file)?;
         }
