@@ -14,3 +14,14 @@ fn lattice_hash(cell: vec2i, seed: u32) -> u32 {
 fn hash_unit(h: u32) -> f32 {
     return f32(h >> 8u) / 16777216.0;
 }
+
+/// `pcg4d` of the same authors: its first word.
+fn lattice_hash_3d(cell: vec3i, seed: u32) -> u32 {
+    var v = vec4u(bitcast<vec3u>(cell), seed) * 1664525u + 1013904223u;
+    v.x += v.y * v.w;
+    v.y += v.z * v.x;
+    v.z += v.x * v.y;
+    v.w += v.y * v.z;
+    v ^= v >> vec4u(16u);
+    return v.x + v.y * v.w;
+}

@@ -125,6 +125,20 @@ impl Block {
             _ => [0.0; 4],
         }
     }
+
+    /// Trilinear sample at a point of the unit cube that the volume fills.
+    pub fn sample(&self, at: [f64; 3], border: Border) -> [f64; 4] {
+        let place: [f64; 3] = std::array::from_fn(|i| at[i] * f64::from(self.size[i]) - 0.5);
+        let mut sum = [0.0; 4];
+        for corner in 0..8_i64 {
+            let far = |axis: usize| corner >> axis & 1;
+            let fraction = |axis: usize| place[axis] - place[axis].floor();
+            let weight: f64 = (0..3).map(|i| if far(i) == 1 { fraction(i) } else { 1.0 - fraction(i) }).product();
+            let voxel = self.load(std::array::from_fn(|i| place[i].floor() as i64 + far(i)), border);
+            (0..4).for_each(|c| sum[c] += weight * voxel[c]);
+        }
+        sum
+    }
 }
 
 /// A triangle mesh.
