@@ -433,6 +433,12 @@ impl<'de> de::Deserializer<'de> for TreeDeserializer<'_> {
         if name.starts_with("$pipe::edge:") {
             return visitor.visit_u64(self.edge(name)?);
         }
+        if name.starts_with("$pipe::edge_or_value:") {
+            return match &self.tree.value {
+                Syntax::Text(_) => visitor.visit_u64(self.edge(name)?),
+                _ => visitor.visit_newtype_struct(self),
+            };
+        }
         if name == Driven::TOKEN || name == Operand::TOKEN {
             return match &self.tree.value {
                 Syntax::Text(text) if !text.starts_with('=') => visitor.visit_u64(self.edge(name)?),
@@ -642,7 +648,14 @@ impl<'de> VariantAccess<'de> for TreeDeserializer<'_> {
         de::Deserializer::deserialize_tuple(self, len, visitor)
     }
 
+    /// The fields of a variant may also be given in their order: `Importance(5)` for `Importance(samples: 5)`.
     fn struct_variant<V: Visitor<'de>>(self, known: &'static [&'static str], visitor: V) -> Result<V::Value, Error> {
-        de::Deserializer::deserialize_struct(self, "", known, visitor)
+        match &self.tree.value {
+            Syntax::Tuple(_, values) if values.len() > known.len() => {
+                Err(Error::at(self.tree.span, format!("found {} values", values.len()), format!("expected {}", known.join(", "))))
+            }
+            Syntax::Tuple(_, values) if !values.is_empty() => self.place(visitor.visit_seq(Elements { d: self, values: values.iter() })),
+            _ => de::Deserializer::deserialize_struct(self, "", known, visitor),
+        }
     }
 }

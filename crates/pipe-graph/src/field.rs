@@ -17,6 +17,8 @@ use crate::types::EdgeKind;
 pub trait Accepts: 'static {
     /// `$pipe::edge:` and the accepted kinds, separated by `|`.
     const TOKEN: &'static str;
+    /// The same for a field that takes a value in place of an edge.
+    const TOKEN_OR_VALUE: &'static str;
 
     /// The kinds in [`Accepts::TOKEN`].
     fn kinds() -> Vec<EdgeKind> {
@@ -38,6 +40,7 @@ macro_rules! accepts {
         pub enum $name {}
         impl Accepts for $name {
             const TOKEN: &'static str = concat!("$pipe::edge:", $kinds);
+            const TOKEN_OR_VALUE: &'static str = concat!("$pipe::edge_or_value:", $kinds);
         }
     )*};
 }
@@ -272,5 +275,55 @@ impl JsonSchema for Operand {
     }
     fn json_schema(_: &mut SchemaGenerator) -> Schema {
         json_schema!({ "type": ["number", "string"], "x-edge": "Image or number" })
+    }
+}
+
+/// An edge, or a value written in its place: `medium: "fog"` or `medium: Homogeneous(10)`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum EdgeOr<E: Accepts, V> {
+    /// What arrives from another node.
+    Edge(In<E>),
+    /// What the graph says itself.
+    Value(V),
+}
+
+impl<'de, E: Accepts, V: Deserialize<'de>> Deserialize<'de> for EdgeOr<E, V> {
+    fn deserialize<D: Deserializer<'de>>(d: D) -> Result<Self, D::Error> {
+        struct Either<E, V>(PhantomData<(E, V)>);
+        impl<'de, E: Accepts, V: Deserialize<'de>> Visitor<'de> for Either<E, V> {
+            type Value = EdgeOr<E, V>;
+
+            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                f.write_str("the name of a node or of a graph input, or a value")
+            }
+            fn visit_u64<R: Error>(self, v: u64) -> Result<Self::Value, R> {
+                u32::try_from(v).map(|i| EdgeOr::Edge(In::new(EdgeIndex(i)))).map_err(R::custom)
+            }
+            fn visit_newtype_struct<D: Deserializer<'de>>(self, d: D) -> Result<Self::Value, D::Error> {
+                V::deserialize(d).map(EdgeOr::Value)
+            }
+        }
+        d.deserialize_newtype_struct(E::TOKEN_OR_VALUE, Either(PhantomData))
+    }
+}
+
+impl<E: Accepts, V: Serialize> Serialize for EdgeOr<E, V> {
+    fn serialize<S: Serializer>(&self, s: S) -> Result<S::Ok, S::Error> {
+        match self {
+            Self::Edge(_) => s.serialize_none(),
+            Self::Value(v) => v.serialize(s),
+        }
+    }
+}
+
+impl<E: Accepts, V: JsonSchema> JsonSchema for EdgeOr<E, V> {
+    fn inline_schema() -> bool {
+        true
+    }
+    fn schema_name() -> std::borrow::Cow<'static, str> {
+        format!("{} or {}", E::TOKEN, V::schema_name()).into()
+    }
+    fn json_schema(generator: &mut SchemaGenerator) -> Schema {
+        json_schema!({ "anyOf": [In::<E>::json_schema(generator), generator.subschema_for::<V>()] })
     }
 }

@@ -26,7 +26,7 @@ pub mod prelude {
     pub use schemars::JsonSchema;
     pub use serde::{Deserialize, Serialize};
 
-    pub use crate::field::{Any, Array, Driven, Image, ImageOrTable, ImageOrVolume, In, Mesh, Operand, Scalar, Table, Volume};
+    pub use crate::field::{Any, Array, Driven, EdgeOr, Image, ImageOrTable, ImageOrVolume, In, Mesh, Operand, Scalar, Table, Volume};
     pub use crate::lowering::{Carried, Lowering, MeshParts};
     pub use crate::node::{Category, FileElement, FileSource, Inputs, Kind, Mistake, Node, Opening, Output, Port, ReadbackFile, TableFile};
     pub use crate::pass::{Access, Border, Constant, Count, Entry, Filter, Grid, Profile, Reach, ResourceId, Shader, Shape, Value};

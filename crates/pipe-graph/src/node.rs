@@ -7,7 +7,7 @@ use schemars::{JsonSchema, Schema, schema_for};
 use serde::de::DeserializeOwned;
 
 use crate::de::TreeDeserializer;
-use crate::field::{Accepts, Driven, EdgeIndex, Image, In, Operand, Table, Volume};
+use crate::field::{Accepts, Driven, EdgeIndex, EdgeOr, Image, In, Operand, Table, Volume};
 use crate::lowering::Lowering;
 use crate::reference::{Reference, Tensor};
 use crate::types::{EdgeType, ImageType, ScalarType, TableType, VolumeType};
@@ -389,6 +389,15 @@ impl<T: Accepts> Port for In<T> {
 impl<T: Accepts> Port for Option<In<T>> {
     fn edge(&self) -> Option<EdgeIndex> {
         self.as_ref().and_then(Port::edge)
+    }
+}
+
+impl<E: Accepts, V> Port for EdgeOr<E, V> {
+    fn edge(&self) -> Option<EdgeIndex> {
+        match self {
+            Self::Edge(port) => port.edge(),
+            Self::Value(_) => None,
+        }
     }
 }
 
