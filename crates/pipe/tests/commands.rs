@@ -270,3 +270,27 @@ fn planning_needs_no_driver() {
     assert_eq!(output.status.code(), Some(2));
     assert!(message(&output).contains("mesa-vulkan-drivers"), "{}", message(&output));
 }
+
+#[test]
+fn frames_become_one_moving_picture() {
+    let folder = folder();
+    let folder = folder.path();
+    let graph = r#"Graph(version: 1, nodes: {
+        "plate": ZonePlate(size: (48, 32)),
+        "moved": Offset(image: "plate", x: "=frame"),
+    }, outputs: {"out": "moved"})"#;
+    fs::write(folder.join("moving.ron"), graph).expect("written");
+    for file in ["moving.apng", "moving.gif"] {
+        succeeds(folder, &["run", "moving.ron", file, "--frames", "1-5", "--fps", "10"]);
+    }
+    let chunks = |name: &[u8; 4]| {
+        let bytes = fs::read(folder.join("moving.apng")).expect("read");
+        bytes.windows(4).filter(|w| w == name).count()
+    };
+    assert_eq!((chunks(b"acTL"), chunks(b"fcTL"), chunks(b"IEND")), (1, 5, 1));
+    let gif = fs::read(folder.join("moving.gif")).expect("read");
+    assert!(gif.starts_with(b"GIF89a") && gif.ends_with(b";"));
+    succeeds(folder, &["compare", "moving.gif", "moving.apng", "--fail", "0.1"]);
+    fails(folder, &["run", "moving.ron", "still.png", "--frames", "1-5"], 1, "out.apng");
+    fails(folder, &["run", "moving.ron", "again.apng", "--frames", "1-5", "--resume"], 1, "--resume");
+}
