@@ -65,6 +65,11 @@ fn run(bench: &mut Bench, graph: &Graph, profile: Profile, inputs: &dyn Fn(&str)
     bench.run(graph, plan, inputs).unwrap_or_else(|e| panic!("{e}")).remove("out").expect("it has this output")
 }
 
+/// The largest difference; infinite where one is not a number.
+fn furthest(pairs: impl Iterator<Item = (f64, f64)>) -> f64 {
+    pairs.map(|(a, b)| (a - b).abs()).fold(0.0, |most, d| if d.is_nan() { f64::INFINITY } else { most.max(d) })
+}
+
 #[test]
 fn filters_agree_with_other_libraries() {
     let references: References =
@@ -80,9 +85,10 @@ fn filters_agree_with_other_libraries() {
                 .pixels
                 .iter()
                 .flat_map(|[x, y]| (0..channels).map(move |c| (y * references.size[0] as usize + x) * channels + c));
-            let off = picked.zip(&case.values).map(|(i, e)| (got[i] - e).abs() / e.abs().max(1.0)).fold(0.0, f64::max);
+            let share = |i: usize, e: f64| (got[i] / e.abs().max(1.0), e / e.abs().max(1.0));
+            let off = furthest(picked.zip(&case.values).map(|(i, e)| share(i, *e)));
             assert_eq!(references.pixels.len() * channels, case.values.len(), "{}", case.node);
-            if !(off <= case.within) {
+            if off > case.within {
                 wrong.push(format!(
                     "{} {} `{}` {profile:?}: off by {off:.2e}, allowed {:.0e}",
                     case.node, case.border, case.port, case.within
@@ -91,6 +97,61 @@ fn filters_agree_with_other_libraries() {
         }
     }
     assert!(wrong.is_empty(), "{} of {}:\n{}", wrong.len(), references.cases.len(), wrong.join("\n"));
+}
+
+/// Weights that are all different, so that no two taps can change places.
+fn uneven(radius: usize) -> Vec<f64> {
+    (0..=2 * radius).map(|i| f64::from((hash(3, i as u64) - 0.3) as f32)).collect()
+}
+
+#[test]
+fn rows_staged_in_workgroup_memory_are_rows() {
+    let mut bench = Bench::new();
+    // Tiles of every height, and several of them with a rest along both axes.
+    for (radius, size) in [(1, [130, 19]), (2, [64, 8]), (5, [61, 47]), (28, [70, 9]), (29, [300, 6]), (64, [260, 5]), (200, [530, 2])] {
+        for border in ["Clamp", "Mirror", "Repeat", "Black"] {
+            let graph = graph(&format!("BlurH(image: \"colour\", weights: {:?})", uneven(radius)), "out", border, size);
+            let inputs = |name: &str| input(name, size);
+            let expected = &reference(&graph, &inputs)["out"];
+            let got = run(&mut bench, &graph, Profile::Gpu, &inputs);
+            // The sum of the absolute weights times the largest value bounds the terms that are added up.
+            let bound = 2e-6 * uneven(radius).iter().map(|w| w.abs()).sum::<f64>() * 15.0;
+            let off = furthest(got.iter().copied().zip(expected.iter().copied()));
+            assert!(off <= bound, "radius {radius} {border}: off by {off:.2e}, allowed {bound:.1e}");
+        }
+    }
+}
+
+#[test]
+fn what_comes_before_a_staged_row_is_computed_while_it_is_loaded() {
+    let mut bench = Bench::new();
+    let size = [61, 47];
+    let text = "Graph(version: 1, inputs: {\"colour\": Image}, nodes: {\"edges\": Laplacian(image: \"colour\"),
+        \"bright\": Exposure(image: \"edges\", ev: 1.5),
+        \"soft\": BlurH(image: \"bright\", sigma: 1, options: (border: Black))}, outputs: {\"out\": \"soft\"})";
+    let graph = compile(text, &[("colour", EdgeType::image(size, 4))]).unwrap_or_else(|e| panic!("{e}"));
+    let inputs = |name: &str| input(name, size);
+    let limits = Limits { profile: Profile::Gpu, ..bench.limits() };
+    let plan = plan(&graph, &limits, &Options::default()).unwrap_or_else(|e| panic!("{e}"));
+    let together = "colour/exposure.wgsl + filters/blur_rows_staged.wgsl";
+    assert!(plan.kernels.iter().any(|k| k.label == together), "{}", plan.to_text());
+    let got = run(&mut bench, &graph, Profile::Gpu, &inputs);
+    let off = furthest(got.into_iter().zip(reference(&graph, &inputs)["out"].iter().copied()));
+    assert!(off <= 1e-5, "off by {off:.2e}");
+}
+
+#[test]
+fn a_staged_row_spreads_infinity_no_further_than_its_radius() {
+    let mut bench = Bench::new();
+    let size = [100, 10];
+    let graph = graph("BlurH(image: \"grey\", sigma: 2)", "out", "Clamp", size);
+    for x in 40..48 {
+        let image = Raster::from_fn(size, 1, |i, j| [if (i, j) == (x, 4) { f64::INFINITY } else { 1.0 }; 4]);
+        let got = run(&mut bench, &graph, Profile::Gpu, &|_| Tensor::Image(image.clone()));
+        let spoiled: Vec<i64> = (0..1000).filter(|i| !got[*i as usize].is_finite()).collect();
+        assert_eq!(spoiled, (400 + x - 6..=400 + x + 6).collect::<Vec<_>>());
+        assert!(spoiled.iter().all(|i| got[*i as usize] == f64::INFINITY));
+    }
 }
 
 /// Images of range 0..1 that a filter of a wide response could get wrong: a dot, an edge, noise.
@@ -116,7 +177,7 @@ fn fast_gaussians_are_within_a_thousandth_of_the_range() {
                 let expected = &reference(&methods[0].1, &inputs)["out"];
                 for (method, graph) in &methods {
                     let got = run(&mut bench, graph, Profile::Gpu, &inputs);
-                    let off = got.iter().zip(expected).map(|(g, e)| (g - e).abs()).fold(0.0, f64::max);
+                    let off = furthest(got.iter().copied().zip(expected.iter().copied()));
                     assert!(off <= 1e-3, "{method}, σ {sigma}, {border}, {what}: off by {off:.2e}");
                 }
             }
@@ -137,7 +198,7 @@ fn importance_sampling_converges_to_the_gaussian() {
     for samples in [1, 5, 25, 125, 625] {
         let graph = graph(&format!("GaussianImportance(image: \"grey\", sigma: 6, samples: {samples})"), "out", "Clamp", size);
         let got = run(&mut bench, &graph, Profile::Cpu, &inputs);
-        let off = got.iter().zip(expected).map(|(g, e)| (g - e).abs()).fold(0.0, f64::max);
+        let off = furthest(got.iter().copied().zip(expected.iter().copied()));
         assert!(off < before / 2.0, "{samples} samples are off by {off:.2e}, fewer by {before:.2e}");
         before = off;
     }
