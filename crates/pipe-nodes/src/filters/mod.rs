@@ -4,7 +4,7 @@ mod bloom;
 mod blur;
 mod box_blur;
 mod convolve;
-mod gaussian;
+pub(crate) mod gaussian;
 mod gaussian_blur;
 mod importance;
 mod recursive;

@@ -1,13 +1,29 @@
 //! Scattering and volumes.
 
 pub(crate) mod camera;
+mod gradient;
+mod isosurface;
 mod maximum_intensity;
 pub(crate) mod resolution;
+mod volume_blur;
+mod volume_gradient;
 mod volume_noise;
+mod volume_render;
+mod volume_resample;
 mod volume_shape;
 mod volume_slice;
 
 use pipe_graph::node::Kind;
 
 /// The kinds of this section, in the order of the reference.
-pub(crate) const KINDS: &[Kind] = &[maximum_intensity::KIND, volume_slice::KIND, volume_noise::KIND, volume_shape::KIND];
+pub(crate) const KINDS: &[Kind] = &[
+    isosurface::KIND,
+    volume_render::KIND,
+    maximum_intensity::KIND,
+    volume_slice::KIND,
+    volume_gradient::KIND,
+    volume_blur::KIND,
+    volume_resample::KIND,
+    volume_noise::KIND,
+    volume_shape::KIND,
+];
