@@ -1,8 +1,10 @@
 //! Scattering and volumes.
 
 pub(crate) mod camera;
+mod cube_table;
 mod gradient;
 mod isosurface;
+mod marching_cubes;
 mod maximum_intensity;
 pub(crate) mod resolution;
 mod volume_blur;
@@ -19,6 +21,7 @@ use pipe_graph::node::Kind;
 pub(crate) const KINDS: &[Kind] = &[
     isosurface::KIND,
     volume_render::KIND,
+    marching_cubes::KIND,
     maximum_intensity::KIND,
     volume_slice::KIND,
     volume_gradient::KIND,
