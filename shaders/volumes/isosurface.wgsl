@@ -7,14 +7,27 @@ struct Hit {
     depth: f32,
 }
 
+/// The distance of the i-th sample.
+fn sample_at(i: i32, span: vec2f) -> f32 {
+    return mix(span.x, span.y, f32(i) / f32(params.steps));
+}
+
 fn surface(origin: vec3f, direction: vec3f, span: vec2f) -> Hit {
-    var before = span.x;
-    for (var i = 0; i <= params.steps; i++) {
-        let distance = mix(span.x, span.y, f32(i) / f32(params.steps));
-        if density(origin + distance * direction) >= params.iso {
-            return Hit(true, refined(origin, direction, before, distance));
+    var i = 0;
+    while i <= params.steps {
+        let distance = sample_at(i, span);
+        let p = origin + distance * direction;
+        let here = brick(p, direction);
+        if here.extreme < params.iso {
+            // On to the last sample in this brick, which is below too.
+            let behind = floor((distance + here.length - span.x) / (span.y - span.x) * f32(params.steps));
+            i = max(i + 1, i32(behind));
+            continue;
         }
-        before = distance;
+        if density(p) >= params.iso {
+            return Hit(true, refined(origin, direction, sample_at(max(i - 1, 0), span), distance));
+        }
+        i++;
     }
     return Hit(false, 0.0);
 }

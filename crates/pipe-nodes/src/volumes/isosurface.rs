@@ -4,6 +4,7 @@ use glam::DVec3;
 use pipe_graph::prelude::*;
 use smart_default::SmartDefault;
 
+use super::bricks::{extremes, with_bricks};
 use super::camera::{Camera, Ray};
 use super::gradient::{facing, gradient, with_gradient};
 use crate::shader;
@@ -66,7 +67,7 @@ impl Isosurface {
         }
         let (mut outside, mut inside) = (at(first - 1), at(first));
         for _ in 0..HALVINGS {
-            let middle = (outside + inside) / 2.0;
+            let middle = f64::midpoint(outside, inside);
             if density(middle) >= iso {
                 inside = middle;
             } else {
@@ -86,10 +87,12 @@ impl Node for Isosurface {
     fn lower(&self, cx: &mut Lowering<'_>) -> Result<(), Mistake> {
         let (volume, border) = (cx.input(&self.volume), cx.border());
         let [out, depth, normal] = ["out", "depth", "normal"].map(|port| cx.output(port));
-        let pass = cx.pass("", with_gradient(&shader!("volumes/isosurface"))).entry(Entry::Each);
+        let bricks = extremes(cx, volume, true);
+        let pass = cx.pass("", with_bricks(&with_gradient(&shader!("volumes/isosurface")))).entry(Entry::Each);
         self.camera
             .describe(pass)
             .read_with("volume", volume, Reach::Whole, border, Filter::Linear)
+            .read_with("bricks", bricks, Reach::Whole, Border::Clamp, Filter::Nearest)
             .write("out", out)
             .write("depth", depth)
             .write("normal", normal)

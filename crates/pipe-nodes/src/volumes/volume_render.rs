@@ -4,6 +4,7 @@ use glam::DVec3;
 use pipe_graph::prelude::*;
 use smart_default::SmartDefault;
 
+use super::bricks::{extremes, with_bricks};
 use super::camera::{Camera, Ray};
 use super::gradient::{facing, gradient, with_gradient};
 use crate::shader;
@@ -137,12 +138,12 @@ impl Node for VolumeRender {
             EdgeOr::Edge(table) => Some(cx.input(table)),
             EdgeOr::Value(Transfer::Lecture) => None,
         };
-        let (transfer, shader) = match table {
-            Some(_) => (shader!("volumes/transfer_table"), shader!("volumes/volume_render")),
-            None => (shader!("volumes/transfer_lecture"), with_gradient(&shader!("volumes/volume_render"))),
+        let (shader, transfer) = match table {
+            Some(_) => (shader!("volumes/volume_render"), shader!("volumes/transfer_table")),
+            None => (with_bricks(&with_gradient(&shader!("volumes/volume_render"))), shader!("volumes/transfer_lecture")),
         };
-        let shader = Shader::builtin(&shader.path, &format!("{}\n{}", shader.source, transfer.source));
-        let pass = cx.pass("", shader);
+        let bricks = table.is_none().then(|| extremes(cx, volume, self.alpha_exponent >= 0.0));
+        let pass = cx.pass("", Shader::builtin(&shader.path, &format!("{}\n{}", shader.source, transfer.source)));
         let mut pass = self
             .camera
             .describe(pass)
@@ -155,6 +156,9 @@ impl Node for VolumeRender {
             .param("alpha_center", self.alpha_center);
         if let Some(table) = table {
             pass = pass.read("transfer", table, Reach::Whole);
+        }
+        if let Some(bricks) = bricks {
+            pass = pass.read_with("bricks", bricks, Reach::Whole, Border::Clamp, Filter::Nearest);
         }
         pass.add();
         Ok(())
