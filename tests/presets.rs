@@ -1,4 +1,4 @@
-//! Every preset that takes one image, from file to file, against its twin in double precision and against a picture that
+//! Every preset that takes one image or one volume, from file to file, against its twin in double precision and against a picture that
 //! the twin made earlier.
 //!
 //! `PIPE_BLESS=1 cargo test -p pipe-tests --test presets` writes the pictures anew, from the twin, never from the GPU.
@@ -8,9 +8,10 @@ use std::path::PathBuf;
 use pipe::presets;
 use pipe::project::{Project, World};
 use pipe::run::{Job, Session};
-use pipe_graph::reference::{Raster, Tensor, evaluate};
+use pipe_graph::reference::{Block, Raster, Tensor, evaluate};
 use pipe_graph::resolve::Request;
 use pipe_graph::types::{EdgeKind, EdgeType};
+use pipe_io::volume::{Volume, Voxel};
 use pipe_io::{Picture, ReadOptions, Source};
 
 const INPUT: &str = "data/workshop-small.exr";
@@ -34,6 +35,59 @@ fn raster(p: &Picture) -> Raster {
     })
 }
 
+/// Two soft lumps that touch, in a box that is no cube.
+fn lumps() -> Block {
+    Block::from_fn([36, 44, 32], 1, |x, y, z| {
+        let p = [x as f64 / 35.0, y as f64 / 43.0, z as f64 / 31.0];
+        let lump = |centre: [f64; 3], width: f64| {
+            let squared: f64 = p.iter().zip(centre).map(|(a, b)| (a - b) * (a - b)).sum();
+            (-squared / (2.0 * width * width)).exp()
+        };
+        let v = 0.7 * lump([0.5, 0.35, 0.45], 0.14) + 0.6 * lump([0.45, 0.68, 0.55], 0.1);
+        let v = f64::from(v as f32);
+        [v, v, v, 1.0]
+    })
+}
+
+/// What a preset is given: a file, and the same in double precision.
+struct Subject {
+    file: String,
+    value: Tensor,
+    ty: EdgeType,
+    settings: Vec<(String, String)>,
+}
+
+impl Subject {
+    /// `None` for presets that take something else.
+    fn of(kind: EdgeKind, folder: &std::path::Path) -> Option<Self> {
+        match kind {
+            EdgeKind::Image => {
+                let file = path(INPUT);
+                let picture = raster(&read(&file));
+                let ty = EdgeType::image(picture.size, 4);
+                Some(Self { file, value: Tensor::Image(picture), ty, settings: Vec::new() })
+            }
+            EdgeKind::Volume => {
+                let (file, block) = (folder.join("lumps.nrrd"), lumps());
+                let floats: Vec<f32> = block.voxels.iter().map(|v| v[0] as f32).collect();
+                let volume = Volume::of_floats(block.size, 1, [1.0; 3], &floats, Voxel::F32);
+                pipe_io::volume::write(&file, &volume).unwrap_or_else(|e| panic!("{e}"));
+                let ty = EdgeType::volume(block.size, 1);
+                let settings = vec![("size".to_owned(), "96".to_owned())];
+                Some(Self { file: file.display().to_string(), value: Tensor::Volume(block), ty, settings })
+            }
+            _ => None,
+        }
+    }
+}
+
+/// The samples of a pixel as an 8-bit file has them: colour not multiplied by alpha.
+fn stored(p: [f64; 4], channels: usize) -> Vec<i32> {
+    let alpha = if channels == 4 && p[3] > 0.0 { p[3].clamp(0.0, 1.0) } else { 1.0 };
+    let sample = |c: usize| if c == 3 { (p[3].clamp(0.0, 1.0) * 255.0 + 0.5) as i32 } else { encode(p[c] / alpha) };
+    (0..channels).map(sample).collect()
+}
+
 /// 8-bit sRGB, rounded to nearest.
 fn encode(v: f64) -> i32 {
     let v = v.clamp(0.0, 1.0);
@@ -49,41 +103,37 @@ fn bytes(p: &Picture) -> Vec<i32> {
 fn presets_agree_with_their_twins_and_goldens() {
     let choice = pipe_gpu::Choice::parse(&std::env::var("PIPE_DEVICE").unwrap_or_default());
     let mut session = Session::open(&choice, None).unwrap_or_else(|e| panic!("{e}"));
-    let input = path(INPUT);
-    let picture = raster(&read(&input));
     let folder = tempfile::tempdir().expect("a folder");
     let bless = std::env::var_os("PIPE_BLESS").is_some();
     let (mut seen, mut wrong) = (0, Vec::new());
     for name in presets::names() {
         let mut project = Project::open(name).unwrap_or_else(|e| panic!("{e}"));
         let document = project.document.clone().expect("presets parse");
-        let takes_one_image = document.inputs.len() == 1 && document.inputs[0].kind == EdgeKind::Image;
-        if !takes_one_image || document.outputs.len() != 1 {
+        if document.inputs.len() != 1 || document.outputs.len() != 1 {
             continue;
         }
+        let Some(subject) = Subject::of(document.inputs[0].kind, folder.path()) else { continue };
         seen += 1;
         let request = Request {
-            inputs: [(document.inputs[0].name.value.clone(), EdgeType::image(picture.size, 4))].into(),
+            inputs: [(document.inputs[0].name.value.clone(), subject.ty)].into(),
+            settings: subject.settings.clone(),
             frame: 1.0,
             ..Request::default()
         };
         let graph = project.resolve(&request, &World::default()).unwrap_or_else(|| panic!("{}", project.render(false)));
-        let twin = evaluate(&graph, &|_| Tensor::Image(picture.clone()));
+        let twin = evaluate(&graph, &|_| subject.value.clone());
         let (_, value) = graph.outputs().next().expect("it has one output");
         let Some(Tensor::Image(twin)) = twin.get(&value) else { panic!("{name} makes no image") };
 
         let out = folder.path().join(format!("{name}.png")).display().to_string();
         let mut job = Job::new(name);
-        job.bind_input(&document.inputs[0].name.value, &input);
+        job.settings = subject.settings;
+        job.bind_input(&document.inputs[0].name.value, &subject.file);
         job.bind_output(&document.outputs[0].0.value, &out).expect("a png");
         session.run(&job).unwrap_or_else(|e| panic!("{name}: {e}"));
         let got = read(&out);
         let channels = got.channels.count();
-        let expected: Vec<i32> = twin
-            .pixels
-            .iter()
-            .flat_map(|p| (0..channels).map(|c| if c == 3 { (p[3].clamp(0.0, 1.0) * 255.0 + 0.5) as i32 } else { encode(p[c]) }))
-            .collect();
+        let expected: Vec<i32> = twin.pixels.iter().flat_map(|p| stored(*p, channels)).collect();
         let golden = path(&format!("golden/{name}.png"));
         if bless {
             let bytes = expected.iter().map(|v| *v as u8).collect();

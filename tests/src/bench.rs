@@ -106,6 +106,10 @@ impl Bench {
         self.executor.release(prepared);
         let mut values = Values::new();
         for (name, value) in graph.outputs() {
+            if let EdgeType::Mesh(_) = graph.ty(value) {
+                values.insert(name.to_owned(), mesh(&|part| outputs.fetched[&format!("{name}.{part}")].clone()));
+                continue;
+            }
             let Some(bytes) = outputs.fetched.get(name) else { continue };
             let words = bytes.chunks_exact(4).map(|w| [w[0], w[1], w[2], w[3]]);
             let list: Vec<f64> = match graph.ty(value) {
@@ -125,6 +129,14 @@ impl Bench {
     }
 }
 
+/// The filled part of a mesh: position and normal of every vertex, then the vertices of every triangle.
+fn mesh(part: &dyn Fn(&str) -> Vec<u8>) -> Vec<f64> {
+    let words = |name: &str| part(name).chunks_exact(4).map(|w| u32::from_le_bytes([w[0], w[1], w[2], w[3]])).collect::<Vec<_>>();
+    let counts = words("counts");
+    let vertices = words("vertices").into_iter().take(6 * counts[0] as usize).map(|w| f64::from(f32::from_bits(w)));
+    vertices.chain(words("triangles").into_iter().take(3 * counts[1] as usize).map(f64::from)).collect()
+}
+
 /// A graph's outputs in double precision.
 pub fn reference(graph: &Graph, inputs: &dyn Fn(&str) -> Tensor) -> Values {
     let all = evaluate(graph, inputs);
@@ -133,7 +145,10 @@ pub fn reference(graph: &Graph, inputs: &dyn Fn(&str) -> Tensor) -> Values {
             Tensor::Image(r) => r.pixels.iter().flat_map(|p| p[..r.channels as usize].to_vec()).collect(),
             Tensor::Volume(b) => b.voxels.iter().flat_map(|p| p[..b.channels as usize].to_vec()).collect(),
             Tensor::Table(t) | Tensor::Scalar(t) => t.clone(),
-            Tensor::Mesh(_) => Vec::new(),
+            Tensor::Mesh(m) => {
+                let vertices = m.vertices.iter().zip(&m.normals).flat_map(|(p, n)| p.iter().chain(n)).copied();
+                vertices.chain(m.triangles.iter().flatten().map(|i| f64::from(*i))).collect()
+            }
         }
     };
     graph.outputs().filter_map(|(name, value)| Some((name.to_owned(), flat(all.get(&value)?)))).collect()

@@ -12,7 +12,7 @@ mod histogram;
 mod histogram2d;
 mod histogram_match;
 mod normalize;
-mod prefix;
+pub(crate) mod prefix;
 mod pyramid_average;
 mod quantile;
 pub(crate) mod reduction;

@@ -6,12 +6,12 @@ use crate::filters::recursive::recursive_axis;
 use crate::shader;
 
 /// The radius beyond which the Gaussian is cut: ceil(3σ).
-pub(super) fn radius(sigma: f32) -> u32 {
+pub(crate) fn radius(sigma: f32) -> u32 {
     (3.0 * sigma).ceil() as u32
 }
 
 /// exp(−k²/2σ²), k = −R..R, normalised to sum 1, in double precision. σ = 0 is a single tap.
-pub(super) fn weights(sigma: f32, radius: u32) -> Vec<f64> {
+pub(crate) fn weights(sigma: f32, radius: u32) -> Vec<f64> {
     let (s, r) = (f64::from(sigma), i64::from(radius));
     let raw: Vec<f64> =
         (-r..=r).map(|k| if s > 0.0 { (-((k * k) as f64) / (2.0 * s * s)).exp() } else { f64::from(u8::from(k == 0)) }).collect();

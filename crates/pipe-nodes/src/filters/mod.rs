@@ -7,7 +7,7 @@ mod blur;
 mod box_blur;
 mod convolve;
 mod difference_of_gaussians;
-mod gaussian;
+pub(crate) mod gaussian;
 mod gaussian_blur;
 mod guided;
 mod importance;

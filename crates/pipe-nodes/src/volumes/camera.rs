@@ -32,6 +32,10 @@ pub(crate) struct Camera {
     /// Replaces eye, target and up: the inverse view matrix of OpenGL, column after column. Its columns are the directions
     /// to the right, up and backward, and the place of the eye.
     matrix: Option<[f32; 16]>,
+    /// Lengths of the volume's edges, in any unit: it is seen as a box of these proportions, its longest edge 1, in the middle
+    /// of the cube. Distances and normals stay those of the unit cube.
+    #[default([1.0, 1.0, 1.0])]
+    extent: [f32; 3],
 }
 
 /// A half-line.
@@ -109,6 +113,9 @@ impl Camera {
         if !(0.1..=175.0).contains(&self.fov) {
             return Err(mistake("`fov` is no angle to look through", "expected 0.1° to 175°"));
         }
+        if !self.extent.iter().all(|n| *n > 0.0) {
+            return Err(mistake("`extent` is no box", "expected three lengths above 0"));
+        }
         match self.matrix {
             Some(m) if [m[3], m[7], m[11], m[15]] != [0.0, 0.0, 0.0, 1.0] => {
                 return Err(mistake("`matrix` is no view", "expected columns one after another, the eye's place in entries 12 to 14"));
@@ -130,6 +137,8 @@ impl Camera {
 
     /// The camera's rays; [`Camera::image`] has checked it.
     pub(crate) fn view(&self) -> View {
+        let extent = DVec3::from(self.extent.map(f64::from));
+        let proportions = extent / extent.max_element();
         let space = match self.matrix {
             Some(m) => DMat4::from_cols_array(&m.map(f64::from)),
             None => {
@@ -141,10 +150,10 @@ impl Camera {
         let aspect = f64::from(self.size[0]) / f64::from(self.size[1]);
         View {
             size: self.size,
-            eye: space.w_axis.truncate(),
-            right: space.x_axis.truncate() * reach * aspect,
-            up: space.y_axis.truncate() * reach,
-            forward: -space.z_axis.truncate(),
+            eye: (space.w_axis.truncate() - 0.5) / proportions + 0.5,
+            right: space.x_axis.truncate() * reach * aspect / proportions,
+            up: space.y_axis.truncate() * reach / proportions,
+            forward: -space.z_axis.truncate() / proportions,
         }
     }
 
@@ -190,6 +199,21 @@ mod tests {
         let (a, b) = (camera.view(), by_matrix.view());
         for (x, y) in [(0, 0), (511, 17), (300, 500)] {
             assert!(close(a.ray(x, y).direction, b.ray(x, y).direction) && close(a.eye, b.eye));
+        }
+    }
+
+    #[test]
+    fn a_flat_volume_is_seen_flat() {
+        // A box of half the height, seen from the front: rays through its upper edge end at the top of the unit cube.
+        let camera = Camera { extent: [2.0, 1.0, 2.0], size: [101, 101], ..Camera::default() };
+        let front = |y: i64| {
+            let ray = camera.view().ray(50, y);
+            ray.at((1.0 - ray.origin.z) / ray.direction.z).y
+        };
+        let reach = 1.5 * 22.5_f64.to_radians().tan();
+        let height = |y: i64| -((y as f64 + 0.5) * 2.0 / 101.0 - 1.0) * reach;
+        for y in [10, 50, 80] {
+            assert!((front(y) - (0.5 + 2.0 * height(y))).abs() < 1e-6);
         }
     }
 

@@ -1,0 +1,165 @@
+//! `MarchingCubes`: the surface where a volume reaches a density, as a mesh.
+//!
+//! One thread walks one row of cells along x, twice: first it counts the row's vertices and triangles, then, with the sums of
+//! all rows before it, it stores them (the rows of W. Schroeder, R. Maynard, B. Geveci, Flying Edges, 2015). A vertex
+//! belongs to the voxel at the lower end of its edge, so a thread knows the vertices of its neighbours' rows by counting
+//! along them, and nothing of the size of the volume is stored between passes.
+
+use glam::DVec3;
+use pipe_graph::prelude::*;
+use smart_default::SmartDefault;
+
+use super::cube_table::{self, STRIDE};
+use super::gradient::{facing, gradient, with_gradient};
+use crate::analysis::prefix::{FAST_RADIX, scan};
+use crate::shader;
+
+/// The surface where the density, between voxel centres, is `iso`: triangles that share their vertices, counter-clockwise
+/// from the side of lower density. Closed surfaces are watertight. A surface that reaches the outermost voxels is open
+/// there, unless `options: (border: Black)` closes it by a layer of density 0. The first channel is the density.
+#[derive(Debug, SmartDefault, Serialize, Deserialize, JsonSchema)]
+#[serde(default)]
+pub(super) struct MarchingCubes {
+    /// The volume.
+    volume: In<Volume>,
+    /// The density of the surface.
+    #[default(0.5.into())]
+    iso: Driven,
+    /// Room for so many triangles; absent: for what smooth surfaces need, at least 262,144. A mesh that needs more is an
+    /// error that says how many.
+    #[schemars(range(min = 1, max = 178956970))]
+    max_triangles: Option<u32>,
+}
+
+pub(super) const KIND: Kind = Kind::of::<MarchingCubes>(
+    "MarchingCubes",
+    Category::Volumes,
+    &[
+        r#"MarchingCubes(volume: "volume")"#,
+        r#"MarchingCubes(volume: "fog", iso: 0.8)"#,
+        r#"MarchingCubes(volume: "volume", iso: "scalar")"#,
+    ],
+)
+.tolerance(2e-4, 0.0);
+
+/// Rooms that are always there: small meshes of small volumes need no thought.
+const LEAST_ROOM: u64 = 1 << 18;
+
+/// The grid of voxel centres, with a layer around it where the surface is to be closed.
+struct Lattice {
+    points: [u32; 3],
+    pad: u32,
+}
+
+impl Lattice {
+    fn new(size: [u32; 3], border: Border) -> Self {
+        let pad = u32::from(border == Border::Black);
+        Self { points: size.map(|n| n + 2 * pad), pad }
+    }
+
+    fn rows(&self) -> u32 {
+        self.points[1] * self.points[2]
+    }
+
+    /// Room for a mesh: vertices and triangles.
+    fn room(&self, asked: Option<u32>) -> MeshType {
+        let [x, y, z] = self.points.map(u64::from);
+        let cells = (x - 1) * (y - 1) * (z - 1);
+        let smooth = 32 * (x * y + y * z + z * x);
+        let triangles = asked.map_or(smooth.max(LEAST_ROOM), u64::from).min(5 * cells).clamp(1, u64::from(u32::MAX) / 24);
+        let vertices = triangles.max(LEAST_ROOM).min(3 * x * y * z);
+        MeshType { max_vertices: vertices as u32, max_triangles: triangles as u32 }
+    }
+}
+
+impl Node for MarchingCubes {
+    fn outputs(&self, inputs: &mut Inputs<'_>) -> Result<Vec<Output>, Mistake> {
+        // The border is known only when lowering; the layer around may need a little more.
+        let lattice = Lattice::new(inputs.volume(&self.volume).size, Border::Black);
+        Ok(Output::out(EdgeType::Mesh(lattice.room(self.max_triangles))))
+    }
+
+    fn lower(&self, cx: &mut Lowering<'_>) -> Result<(), Mistake> {
+        let (volume, border) = (cx.input(&self.volume), cx.border());
+        let (Shape::Volume(ty), EdgeType::Mesh(room)) = (cx.shape(volume), cx.output_type("out")) else {
+            unreachable!("the resolver bound a volume, and `outputs` has declared a mesh")
+        };
+        let lattice = Lattice::new(ty.size, border);
+        let cases = cx.uints("cases", &cube_table::words());
+        let pass = |cx: &mut Lowering<'_>, name: &str, source: Shader, reads: &[(&str, ResourceId)], writes: &[(&str, ResourceId)]| {
+            let rows = format!("{}\n{}", source.source, shader!("volumes/marching_rows").source);
+            let mut pass = cx
+                .pass(name, Shader::builtin(&source.path, &rows))
+                .entry(Entry::Each)
+                .grid(Grid::Elements([lattice.rows(), 1, 1]))
+                .read_with("volume", volume, Reach::Whole, border, Filter::Linear)
+                .read("cases", cases, Reach::Whole)
+                .driven("iso", &self.iso)
+                .param("points", lattice.points.map(|n| n as i32))
+                .constant("PAD", lattice.pad as i32)
+                .constant("STRIDE", STRIDE as i32);
+            for (port, id) in reads {
+                pass = pass.read(port, *id, Reach::Whole);
+            }
+            for (port, id) in writes {
+                pass = pass.write(port, *id);
+            }
+            pass.add();
+        };
+        let table = Shape::uints(lattice.rows());
+        let (vertices, triangles) = (cx.intermediate("row_vertices", table), cx.intermediate("row_triangles", table));
+        pass(cx, "count", shader!("volumes/marching_count"), &[], &[("vertices", vertices), ("triangles", triangles)]);
+        let vertex_sums = scan(cx, "vertex_sums", vertices, true, FAST_RADIX);
+        let triangle_sums = scan(cx, "triangle_sums", triangles, true, FAST_RADIX);
+        let parts = MeshParts {
+            vertices: cx.intermediate("vertices", Shape::floats(6 * room.max_vertices)),
+            triangles: cx.intermediate("triangles", Shape::uints(3 * room.max_triangles)),
+            counts: cx.intermediate("counts", Shape::uints(2)),
+        };
+        let sums = [("vertex_sums", vertex_sums), ("triangle_sums", triangle_sums)];
+        let mesh = [("vertices", parts.vertices), ("triangles", parts.triangles)];
+        pass(cx, "emit", with_gradient(&shader!("volumes/marching_emit")), &sums, &mesh);
+        cx.pass("total", shader!("volumes/marching_total"))
+            .read("vertex_sums", vertex_sums, Reach::Whole)
+            .read("triangle_sums", triangle_sums, Reach::Whole)
+            .write("out", parts.counts)
+            .add();
+        cx.emit_mesh("out", parts);
+        Ok(())
+    }
+
+    fn reference(&self, cx: &Reference<'_>) -> Vec<Tensor> {
+        let (volume, iso) = (cx.volume(&self.volume), cx.driven(&self.iso));
+        let lattice = Lattice::new(volume.size, cx.border);
+        let [w, h, d] = lattice.points.map(i64::from);
+        let pad = i64::from(lattice.pad);
+        let density = |p: [i64; 3]| volume.load(p.map(|i| i - pad), cx.border)[0];
+        let place = |p: [i64; 3]| -> DVec3 { std::array::from_fn(|i| ((p[i] - pad) as f64 + 0.5) / f64::from(volume.size[i])).into() };
+        let grid = || (0..d).flat_map(move |z| (0..h).flat_map(move |y| (0..w).map(move |x| [x, y, z])));
+        let mut mesh = Triangles::default();
+        let mut numbers = std::collections::HashMap::new();
+        for p in grid() {
+            for axis in 0..3 {
+                let mut q = p;
+                q[axis] += 1;
+                let (a, b) = (density(p), density(q));
+                if q[axis] == [w, h, d][axis] || (a >= iso) == (b >= iso) {
+                    continue;
+                }
+                let vertex = place(p).lerp(place(q), ((iso - a) / (b - a)).clamp(0.0, 1.0));
+                let normal = facing(gradient(volume, vertex, cx.border));
+                let outwards = if a > b { DVec3::AXES[axis] } else { -DVec3::AXES[axis] };
+                numbers.insert((p, axis), mesh.vertices.len() as u32);
+                mesh.vertices.push(vertex.to_array());
+                mesh.normals.push(if normal == DVec3::ZERO { outwards } else { normal }.to_array());
+            }
+        }
+        for [x, y, z] in grid().filter(|p| p[0] + 1 < w && p[1] + 1 < h && p[2] + 1 < d) {
+            let corner = |c: usize| [x + (c & 1) as i64, y + (c >> 1 & 1) as i64, z + (c >> 2) as i64];
+            let case = (0..8).fold(0, |case, c| case | usize::from(density(corner(c)) >= iso) << c);
+            let numbered = cube_table::triangles(case).into_iter().map(|t| t.map(|e| numbers[&(corner(e.corner), e.axis)]));
+            mesh.triangles.extend(numbered);
+        }
+        vec![Tensor::Mesh(mesh)]
+    }
+}

@@ -1,0 +1,337 @@
+//! Volumes and their viewers against geometry and optics: spheres of known depth, area and volume, transmittance of known
+//! length, meshes whose every side is shared by two triangles.
+
+#![allow(clippy::unwrap_used)] // a test may stop where it stands
+
+use std::collections::HashMap;
+use std::path::Path;
+
+use pipe::run::{Job, Session};
+use pipe_graph::reference::Tensor;
+use pipe_graph::types::EdgeType;
+use pipe_tests::bench::{Bench, Values, compile};
+
+type Vector = [f64; 3];
+
+fn sub(a: Vector, b: Vector) -> Vector {
+    [0, 1, 2].map(|i| a[i] - b[i])
+}
+
+fn dot(a: Vector, b: Vector) -> f64 {
+    (0..3).map(|i| a[i] * b[i]).sum()
+}
+
+fn cross(a: Vector, b: Vector) -> Vector {
+    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+}
+
+fn graph_text(nodes: &str, outputs: &str) -> String {
+    format!("Graph(version: 1, nodes: {{{nodes}}}, outputs: {{{outputs}}})")
+}
+
+/// The outputs of a graph without inputs.
+fn run(nodes: &str, outputs: &str) -> Values {
+    let graph = compile(&graph_text(nodes, outputs), &[]).unwrap_or_else(|e| panic!("{e}"));
+    Bench::new().gpu(&graph, &|name| -> Tensor { panic!("there is no input {name}") }).unwrap_or_else(|e| panic!("{e}"))
+}
+
+/// Direction of the ray through a pixel for an eye on the z axis of the cube, looking along −z with a field of view of 45°.
+fn direction(x: usize, y: usize, size: usize) -> Vector {
+    let reach = (22.5_f64).to_radians().tan();
+    let at = |i: usize| ((i as f64 + 0.5) * 2.0 / size as f64 - 1.0) * reach;
+    let d = [at(x), -at(y), -1.0];
+    let length = dot(d, d).sqrt();
+    d.map(|v| v / length)
+}
+
+const EYE: Vector = [0.5, 0.5, 2.5];
+
+#[test]
+fn the_isosurface_of_a_sphere_is_where_and_as_geometry_says() {
+    const SIZE: usize = 65;
+    let values = run(
+        r#""ball": VolumeShape(resolution: 96, size: 0.35, softness: 0.2),
+           "seen": Isosurface(volume: "ball", steps: 128, camera: (size: (65, 65)))"#,
+        r#""out": "seen", "depth": "seen.depth", "normal": "seen.normal""#,
+    );
+    let light = [0.3, -2.0, 0.0];
+    let (mut hits, mut misses) = (0, 0);
+    for (i, depth) in values["depth"].iter().enumerate() {
+        let d = direction(i % SIZE, i / SIZE, SIZE);
+        let to_eye = sub(EYE, [0.5; 3]);
+        let b = dot(to_eye, d);
+        let discriminant = b * b - dot(to_eye, to_eye) + 0.35 * 0.35;
+        if discriminant < -0.002 {
+            assert_eq!(*depth, 0.0, "pixel {i} misses");
+            misses += 1;
+        }
+        // Grazing rays turn a small error of the surface into a large one of depth.
+        if discriminant < 0.015 {
+            continue;
+        }
+        hits += 1;
+        let expected = -b - discriminant.sqrt();
+        assert!((depth - expected).abs() < 6e-4, "depth of pixel {i}: {depth}, not {expected}");
+        let p: Vector = std::array::from_fn(|k| EYE[k] + expected * d[k]);
+        let n = sub(p, [0.5; 3]).map(|v| v / 0.35);
+        let got = &values["normal"][4 * i..4 * i + 4];
+        let off = (0..3).map(|k| (got[k] - n[k]).abs()).fold(0.0, f64::max);
+        assert!(off < 4e-3 && got[3] == 1.0, "normal of pixel {i}: {got:?}, not {n:?}");
+        let l = sub(light, p);
+        let shade = 0.5 + 0.5 * dot(n, l) / dot(l, l).sqrt();
+        assert!((values["out"][4 * i] - shade).abs() < 4e-3, "shade of pixel {i}: {}, not {shade}", values["out"][4 * i]);
+    }
+    assert!(hits > 500 && misses > 2000, "{hits} hits, {misses} misses");
+}
+
+#[test]
+fn the_surface_is_refined() {
+    let seen = |refine: bool| {
+        run(
+            &format!(
+                r#""ball": VolumeShape(resolution: 64, size: 0.35, softness: 0.2),
+                   "seen": Isosurface(volume: "ball", steps: 16, refine: {refine}, camera: (size: (1, 1)))"#
+            ),
+            r#""depth": "seen.depth""#,
+        )["depth"][0]
+    };
+    assert!((seen(true) - 1.65).abs() < 5e-4, "{}", seen(true));
+    assert!((seen(false) - 1.65).abs() > 1e-2, "without refinement it is a whole sample: {}", seen(false));
+}
+
+/// Transmittance of a homogeneous cube: (1 − α)^(length / reference step), whatever the number of steps.
+#[test]
+fn a_homogeneous_cube_lets_through_what_the_law_of_beer_says() {
+    const SIZE: usize = 33;
+    let alpha: f64 = 0.02;
+    for (order, steps) in [("FrontToBack", 256), ("BackToFront", 256), ("FrontToBack", 40), ("BackToFront", 1000)] {
+        let values = run(
+            &format!(
+                r#""fog": VolumeShape(shape: Box, size: 2, resolution: 8),
+                   "seen": VolumeRender(volume: "fog", order: {order}, steps: {steps}, alpha_center: {}, camera: (size: (33, 33)))"#,
+                1.5 - alpha
+            ),
+            r#""out": "seen""#,
+        );
+        for i in 0..SIZE * SIZE {
+            let d = direction(i % SIZE, i / SIZE, SIZE);
+            let (mut enter, mut leave) = (0.0_f64, f64::INFINITY);
+            for k in 0..3 {
+                let (a, b) = ((0.0 - EYE[k]) / d[k], (1.0 - EYE[k]) / d[k]);
+                (enter, leave) = (enter.max(a.min(b)), leave.min(a.max(b)));
+            }
+            let length = (leave - enter).max(0.0);
+            let expected = 1.0 - (1.0 - alpha).powf(length * 256.0 / 3.0_f64.sqrt());
+            let got = values["out"][4 * i + 3];
+            assert!((got - expected).abs() < 1e-4, "{order}, {steps} steps, pixel {i}: {got}, not {expected}");
+        }
+    }
+}
+
+#[test]
+fn both_orders_of_compositing_agree() {
+    for body in [
+        "VolumeNoise(resolution: 48, frequency: 5, seed: 2)",
+        "VolumeShape(shape: Torus, resolution: 48, softness: 0.3)",
+        "VolumeShape(shape: Sphere, resolution: 48, softness: 0.02, size: 0.45)",
+    ] {
+        for (exponent, center) in [(1.0, 0.5), (6.0, 0.55), (0.4, 1.6)] {
+            let look = |order: &str| {
+                format!(
+                    r#"VolumeRender(volume: "body", order: {order}, alpha_exponent: {exponent}, alpha_center: {center},
+                                   camera: (eye: (1.7, 1.4, 1.9), size: (48, 40)))"#
+                )
+            };
+            let nodes = format!(r#""body": {body}, "front": {}, "back": {}"#, look("FrontToBack"), look("BackToFront"));
+            let values = run(&nodes, r#""front": "front", "back": "back""#);
+            let off = values["front"].iter().zip(&values["back"]).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+            assert!(off < 1e-4, "{body}, e = {exponent}, c = {center}: off by {off}");
+            assert!(values["front"].iter().any(|v| *v > 0.1), "there is something to see");
+        }
+    }
+}
+
+/// A mesh as its PLY file has it.
+struct Mesh {
+    vertices: Vec<Vector>,
+    normals: Vec<Vector>,
+    triangles: Vec<[usize; 3]>,
+}
+
+/// Runs a graph whose output `out` is a mesh, from file to file.
+fn mesh(nodes: &str) -> Mesh {
+    let folder = tempfile::tempdir().unwrap();
+    let graph = folder.path().join("mesh.ron");
+    std::fs::write(&graph, graph_text(nodes, r#""out": "mesh""#)).unwrap();
+    let choice = pipe_gpu::Choice::parse(&std::env::var("PIPE_DEVICE").unwrap_or_default());
+    let mut session = Session::open(&choice, None).unwrap_or_else(|e| panic!("{e}"));
+    let ply = folder.path().join("mesh.ply");
+    let mut job = Job::new(&graph.display().to_string());
+    job.bind_output("out", &ply.display().to_string()).unwrap();
+    session.run(&job).unwrap_or_else(|e| panic!("{e}"));
+    read_ply(&ply)
+}
+
+fn read_ply(path: &Path) -> Mesh {
+    let bytes = std::fs::read(path).unwrap();
+    let end = bytes.windows(11).position(|w| w == b"end_header\n").unwrap() + 11;
+    let header = std::str::from_utf8(&bytes[..end]).unwrap();
+    let count =
+        |what: &str| -> usize { header.split(&format!("element {what} ")).nth(1).unwrap().lines().next().unwrap().parse().unwrap() };
+    let (vertices, faces) = (count("vertex"), count("face"));
+    let (points, corners) = bytes[end..].split_at(vertices * 24);
+    let float = |b: &[u8]| f64::from(f32::from_le_bytes([b[0], b[1], b[2], b[3]]));
+    let vector = |b: &[u8]| [0, 4, 8].map(|at| float(&b[at..]));
+    let index = |b: &[u8]| u32::from_le_bytes([b[0], b[1], b[2], b[3]]) as usize;
+    assert_eq!(corners.len(), faces * 13);
+    Mesh {
+        vertices: points.chunks_exact(24).map(vector).collect(),
+        normals: points.chunks_exact(24).map(|v| vector(&v[12..])).collect(),
+        triangles: corners.chunks_exact(13).map(|t| [1, 5, 9].map(|at| index(&t[at..]))).collect(),
+    }
+}
+
+impl Mesh {
+    fn corners(&self, triangle: [usize; 3]) -> [Vector; 3] {
+        triangle.map(|i| self.vertices[i])
+    }
+
+    fn area(&self) -> f64 {
+        let double = |t: &[usize; 3]| {
+            let [a, b, c] = self.corners(*t);
+            let n = cross(sub(b, a), sub(c, a));
+            dot(n, n).sqrt()
+        };
+        self.triangles.iter().map(double).sum::<f64>() / 2.0
+    }
+
+    /// Positive when triangles are counter-clockwise from outside.
+    fn volume(&self) -> f64 {
+        self.triangles.iter().map(|t| self.corners(*t)).map(|[a, b, c]| dot(a, cross(b, c))).sum::<f64>() / 6.0
+    }
+
+    /// Vertices − edges + triangles.
+    fn euler(&self) -> i64 {
+        let mut edges: Vec<[usize; 2]> = self.sides().map(|[a, b]| [a.min(b), a.max(b)]).collect();
+        edges.sort_unstable();
+        edges.dedup();
+        self.vertices.len() as i64 - edges.len() as i64 + self.triangles.len() as i64
+    }
+
+    fn sides(&self) -> impl Iterator<Item = [usize; 2]> + '_ {
+        self.triangles.iter().flat_map(|[a, b, c]| [[*a, *b], [*b, *c], [*c, *a]])
+    }
+
+    /// Every side is there once, and once in the other direction; every vertex belongs to a triangle.
+    fn assert_watertight(&self) {
+        let mut sides: HashMap<[usize; 2], u32> = HashMap::new();
+        self.sides().for_each(|side| *sides.entry(side).or_default() += 1);
+        assert!(sides.values().all(|n| *n == 1), "a side belongs to two triangles of one orientation");
+        assert!(sides.keys().all(|[a, b]| sides.contains_key(&[*b, *a])), "a side is open");
+        let mut used = vec![false; self.vertices.len()];
+        self.triangles.iter().flatten().for_each(|i| used[*i] = true);
+        assert!(used.into_iter().all(|u| u), "a vertex belongs to no triangle");
+    }
+}
+
+#[test]
+fn the_mesh_of_a_sphere_is_a_sphere() {
+    let r = 0.35;
+    let ball = mesh(
+        r#""ball": VolumeShape(resolution: 64, size: 0.35, softness: 0.2),
+           "mesh": MarchingCubes(volume: "ball")"#,
+    );
+    ball.assert_watertight();
+    assert_eq!(ball.euler(), 2);
+    let (area, volume) = (4.0 * std::f64::consts::PI * r * r, 4.0 / 3.0 * std::f64::consts::PI * r * r * r);
+    assert!((ball.area() / area - 1.0).abs() < 3e-3, "area {}, not {area}", ball.area());
+    assert!((ball.volume() / volume - 1.0).abs() < 3e-3, "volume {}, not {volume}", ball.volume());
+    for (vertex, normal) in ball.vertices.iter().zip(&ball.normals) {
+        let out = sub(*vertex, [0.5; 3]);
+        let distance = dot(out, out).sqrt();
+        assert!((distance - r).abs() < 2e-4, "a vertex at {distance} from the centre");
+        assert!(dot(out, *normal) / distance > 0.999, "a normal {normal:?} at {out:?}");
+    }
+}
+
+#[test]
+fn the_mesh_of_a_torus_has_a_hole() {
+    let ring = mesh(
+        r#""ring": VolumeShape(shape: Torus, resolution: [64, 64, 32], size: 0.3, softness: 0.1),
+           "mesh": MarchingCubes(volume: "ring")"#,
+    );
+    ring.assert_watertight();
+    assert_eq!(ring.euler(), 0);
+    let volume = 2.0 * std::f64::consts::PI.powi(2) * 0.3 * 0.1 * 0.1;
+    assert!((ring.volume() / volume - 1.0).abs() < 0.02, "volume {}, not {volume}", ring.volume());
+}
+
+/// Noise meets every ambiguous case, and the faces of the cube; a black border closes it there.
+#[test]
+fn the_mesh_of_noise_is_watertight() {
+    let noise = mesh(
+        r#""noise": VolumeNoise(resolution: [40, 33, 27], frequency: 19, octaves: 1, seed: 5),
+           "mesh": MarchingCubes(volume: "noise", iso: 0.52, options: (border: Black))"#,
+    );
+    assert!(noise.triangles.len() > 30_000, "{} triangles", noise.triangles.len());
+    noise.assert_watertight();
+    assert!(noise.volume() > 0.0);
+}
+
+#[test]
+fn a_mesh_without_room_says_what_it_needs() {
+    let folder = tempfile::tempdir().unwrap();
+    let graph = folder.path().join("mesh.ron");
+    let nodes = r#""ball": VolumeShape(), "mesh": MarchingCubes(volume: "ball", max_triangles: 100)"#;
+    std::fs::write(&graph, graph_text(nodes, r#""out": "mesh""#)).unwrap();
+    let mut session = Session::open(&pipe_gpu::Choice::parse(&std::env::var("PIPE_DEVICE").unwrap_or_default()), None).unwrap();
+    let mut job = Job::new(&graph.display().to_string());
+    let obj = folder.path().join("mesh.obj");
+    job.bind_output("out", &obj.display().to_string()).unwrap();
+    let error = session.run(&job).unwrap_err().to_string();
+    assert!(error.contains("room for") && error.contains("max_triangles"), "{error}");
+    assert!(!obj.exists());
+}
+
+#[test]
+fn a_volume_larger_than_the_budget_says_so_before_it_is_made() {
+    let text = graph_text(r#""body": VolumeShape(resolution: 512)"#, r#""out": "body""#);
+    let graph = compile(&text, &[]).unwrap();
+    let EdgeType::Volume(ty) = graph.ty(graph.outputs().next().unwrap().1) else { panic!("it is a volume") };
+    assert_eq!(ty.size, [512; 3]);
+    let limits = pipe_graph::pass::Limits { budget: Some(300 << 20), ..Default::default() };
+    let error = pipe_tests::bench::plan(&graph, &limits, &pipe_plan::Options { budget: limits.budget, ..Default::default() }).unwrap_err();
+    assert!(error.contains("MiB") || error.contains("GiB"), "{error}");
+}
+
+/// NRRD in, NPY out: voxels as they were, whatever their type.
+#[test]
+fn volumes_go_through_a_graph_unchanged() {
+    use pipe_io::volume::{Volume, Voxel, read, write};
+    let folder = tempfile::tempdir().unwrap();
+    let graph = folder.path().join("copy.ron");
+    std::fs::write(&graph, r#"Graph(version: 1, inputs: {"in": Volume}, nodes: {}, outputs: {"out": "in"})"#).unwrap();
+    let mut session = Session::open(&pipe_gpu::Choice::parse(&std::env::var("PIPE_DEVICE").unwrap_or_default()), None).unwrap();
+    let file = |name: &str| folder.path().join(name).display().to_string();
+    let open = |name: &str| read(&pipe_io::Source::parse(&file(name)), &pipe_io::Limits::default()).unwrap();
+    for voxel in [Voxel::U8, Voxel::I8, Voxel::U16, Voxel::I16, Voxel::U32, Voxel::I32, Voxel::F16, Voxel::F32] {
+        for channels in [1, 4] {
+            let floats: Vec<f32> =
+                (0..7 * 5 * 3 * i32::from(channels)).map(|i| (i - 40) as f32 * 0.01 * f32::from(u8::from(i % 3 > 0))).collect();
+            let floats = if matches!(voxel, Voxel::U32 | Voxel::I32 | Voxel::I16 | Voxel::I8) {
+                floats.iter().map(|v| (v * 60.0).round()).collect()
+            } else {
+                floats
+            };
+            write(&folder.path().join("in.npy"), &Volume::of_floats([7, 5, 3], channels, [1.0; 3], &floats, voxel)).unwrap();
+            let mut job = Job::new(&graph.display().to_string());
+            job.bind_input("in", &file("in.npy"));
+            job.bind_output("out", &file("out.npy")).unwrap();
+            session.run(&job).unwrap_or_else(|e| panic!("{e}"));
+            let (given, got) = (open("in.npy"), open("out.npy"));
+            assert_eq!((got.header.size, got.header.channels), ([7, 5, 3], channels));
+            let off = given.values().iter().zip(got.values()).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
+            assert!(off <= 1e-7, "{voxel:?} of {channels} channels is off by {off}");
+        }
+    }
+}
