@@ -1,5 +1,6 @@
 //! Scattering and volumes.
 
+mod bricks;
 pub(crate) mod camera;
 mod cube_table;
 mod dispatches;
