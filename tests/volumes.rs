@@ -7,9 +7,11 @@ use std::collections::HashMap;
 use std::path::Path;
 
 use pipe::run::{Job, Session};
+use pipe_graph::pass::Limits;
 use pipe_graph::reference::Tensor;
 use pipe_graph::types::EdgeType;
 use pipe_tests::bench::{Bench, Values, compile};
+use pipe_tests::source::{edge, edge_type};
 
 type Vector = [f64; 3];
 
@@ -299,9 +301,26 @@ fn a_volume_larger_than_the_budget_says_so_before_it_is_made() {
     let graph = compile(&text, &[]).unwrap();
     let EdgeType::Volume(ty) = graph.ty(graph.outputs().next().unwrap().1) else { panic!("it is a volume") };
     assert_eq!(ty.size, [512; 3]);
-    let limits = pipe_graph::pass::Limits { budget: Some(300 << 20), ..Default::default() };
+    let limits = Limits { budget: Some(300 << 20), ..Default::default() };
     let error = pipe_tests::bench::plan(&graph, &limits, &pipe_plan::Options { budget: limits.budget, ..Default::default() }).unwrap_err();
     assert!(error.contains("MiB") || error.contains("GiB"), "{error}");
+}
+
+/// Buffers that a shader binds have a largest size: volumes cross the rim in bands of slices.
+#[test]
+fn volumes_cross_the_rim_in_bands() {
+    let graph = r#"Graph(version: 1, inputs: {"volume": Volume}, nodes: {}, outputs: {"out": "volume"})"#;
+    let graph = compile(graph, &[("volume", edge_type("volume", [1, 1]))]).unwrap();
+    let mut bench = Bench::new();
+    let input = |name: &str| edge(name, [1, 1]);
+    for max_binding_bytes in [7_000, 13_000, 1 << 20] {
+        let limits = Limits { max_binding_bytes, ..bench.limits() };
+        let plan = pipe_tests::bench::plan(&graph, &limits, &pipe_plan::Options::default()).unwrap();
+        let got = bench.run(&graph, plan, &input).unwrap();
+        let Tensor::Volume(block) = input("volume") else { panic!("it is a volume") };
+        let expected: Vec<f64> = block.voxels.iter().map(|v| v[0]).collect();
+        assert_eq!(got["out"], expected, "in bindings of {max_binding_bytes} bytes");
+    }
 }
 
 /// NRRD in, NPY out: voxels as they were, whatever their type.
@@ -311,6 +330,8 @@ fn volumes_go_through_a_graph_unchanged() {
     let folder = tempfile::tempdir().unwrap();
     let graph = folder.path().join("copy.ron");
     std::fs::write(&graph, r#"Graph(version: 1, inputs: {"in": Volume}, nodes: {}, outputs: {"out": "in"})"#).unwrap();
+    let read_graph = folder.path().join("read.ron");
+    std::fs::write(&read_graph, graph_text(r#""v": ReadVolume(path: "in.npy")"#, r#""out": "v""#)).unwrap();
     let mut session = Session::open(&pipe_gpu::Choice::parse(&std::env::var("PIPE_DEVICE").unwrap_or_default()), None).unwrap();
     let file = |name: &str| folder.path().join(name).display().to_string();
     let open = |name: &str| read(&pipe_io::Source::parse(&file(name)), &pipe_io::Limits::default()).unwrap();
@@ -332,6 +353,11 @@ fn volumes_go_through_a_graph_unchanged() {
             assert_eq!((got.header.size, got.header.channels), ([7, 5, 3], channels));
             let off = given.values().iter().zip(got.values()).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
             assert!(off <= 1e-7, "{voxel:?} of {channels} channels is off by {off}");
+            // A node that reads the file finds it beside the graph.
+            let mut job = Job::new(&read_graph.display().to_string());
+            job.bind_output("out", &file("again.npy")).unwrap();
+            session.run(&job).unwrap_or_else(|e| panic!("{e}"));
+            assert_eq!(open("again.npy"), got);
         }
     }
 }

@@ -9,8 +9,9 @@ use super::camera::{Camera, Ray};
 use super::gradient::{facing, gradient, with_gradient};
 use crate::shader;
 
-/// The first point of every eye ray where the density reaches `iso`, lit by a point light: 0.5 + 0.5·n·l, n facing from high
-/// to low density by central differences over two voxels, l towards the light. Transparent where there is none.
+/// The surface where a volume reaches a density, lit by a point light. It is the first point of every eye ray where the density
+/// is `iso` or more; its brightness is 0.5 + 0.5·n·l, n facing from high to low density by central differences over two
+/// voxels, l towards the light. Transparent where there is none.
 ///
 /// A density that is reached on a face of the unit cube shows that face: with `options: (border: Black)` normals there
 /// point outwards, otherwise they follow the density inside. The first channel is the density.
@@ -87,7 +88,7 @@ impl Node for Isosurface {
     fn lower(&self, cx: &mut Lowering<'_>) -> Result<(), Mistake> {
         let (volume, border) = (cx.input(&self.volume), cx.border());
         let [out, depth, normal] = ["out", "depth", "normal"].map(|port| cx.output(port));
-        let bricks = extremes(cx, volume, true);
+        let bricks = extremes(cx, volume, border, true);
         let pass = cx.pass("", with_bricks(&with_gradient(&shader!("volumes/isosurface")))).entry(Entry::Each);
         self.camera
             .describe(pass)

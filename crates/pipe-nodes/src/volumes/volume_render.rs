@@ -9,7 +9,8 @@ use super::camera::{Camera, Ray};
 use super::gradient::{facing, gradient, with_gradient};
 use crate::shader;
 
-/// Composites samples of a volume along every eye ray (R. Drebin, L. Carpenter, P. Hanrahan, Volume Rendering, 1988).
+/// A volume as a coloured, translucent body: samples along every eye ray are composited. See R. Drebin, L. Carpenter and
+/// P. Hanrahan, Volume Rendering, 1988.
 ///
 /// A sample of density d has the opacity α = clamp(e·(d − c) + 0.5, 0, 1) and, with `transfer: Lecture`, the colour
 /// (0.5 + 0.5·n·l)·(d, d², d³) + 0.1, n facing from high to low density by central differences over two voxels, l towards
@@ -142,7 +143,7 @@ impl Node for VolumeRender {
             Some(_) => (shader!("volumes/volume_render"), shader!("volumes/transfer_table")),
             None => (with_bricks(&with_gradient(&shader!("volumes/volume_render"))), shader!("volumes/transfer_lecture")),
         };
-        let bricks = table.is_none().then(|| extremes(cx, volume, self.alpha_exponent >= 0.0));
+        let bricks = table.is_none().then(|| extremes(cx, volume, border, self.alpha_exponent >= 0.0));
         let pass = cx.pass("", Shader::builtin(&shader.path, &format!("{}\n{}", shader.source, transfer.source)));
         let mut pass = self
             .camera
