@@ -323,6 +323,26 @@ fn volumes_cross_the_rim_in_bands() {
     }
 }
 
+/// Proportions of scans: the spacing in a file's header is known to expressions.
+#[test]
+fn expressions_know_the_spacing_of_voxels() {
+    use pipe_io::volume::{Volume, Voxel, write};
+    let folder = tempfile::tempdir().unwrap();
+    let file = |name: &str| folder.path().join(name).display().to_string();
+    let nodes = r#""v": VolumeSlice(volume: "in"), "c": Constant(color: ("=in.dx", "=in.dy", "=in.dz*in.depth", 1), size: (1, 1))"#;
+    let text = format!(r#"Graph(version: 1, inputs: {{"in": Volume}}, nodes: {{{nodes}}}, outputs: {{"out": "c", "slice": "v"}})"#);
+    std::fs::write(folder.path().join("spacing.ron"), text).unwrap();
+    let volume = Volume::of_floats([2, 3, 4], 1, [0.5, 0.75, 2.0], &[0.0; 24], Voxel::F32);
+    write(&folder.path().join("in.nrrd"), &volume).unwrap();
+    let mut session = Session::open(&pipe_gpu::Choice::parse(&std::env::var("PIPE_DEVICE").unwrap_or_default()), None).unwrap();
+    let mut job = Job::new(&file("spacing.ron"));
+    job.bind_input("in", &file("in.nrrd"));
+    job.bind_output("out", &file("out.exr")).unwrap();
+    session.run(&job).unwrap_or_else(|e| panic!("{e}"));
+    let out = pipe_io::read(&pipe_io::Source::parse(&file("out.exr")), &pipe_io::ReadOptions::default()).unwrap();
+    assert_eq!([0, 1, 2].map(|c| out.sample_at(0, 0, c).unwrap()), [0.5, 0.75, 8.0]);
+}
+
 /// NRRD in, NPY out: voxels as they were, whatever their type.
 #[test]
 fn volumes_go_through_a_graph_unchanged() {

@@ -378,8 +378,13 @@ pub fn input_kinds(project: &mut Project) -> HashMap<String, EdgeKind> {
 
 /// What the resolver must know of a job.
 pub fn request(job: &Job, inputs: &Inputs) -> Request {
+    let spacing = |(name, value): (&String, &Decoded)| match value {
+        Decoded::Volume(volume) => Some((name.clone(), volume.header.spacing)),
+        _ => None,
+    };
     Request {
         inputs: inputs.iter().map(|(name, value)| (name.clone(), value.ty())).collect(),
+        spacings: inputs.iter().filter_map(spacing).collect(),
         assumed: None,
         settings: job.settings.clone(),
         frame: job.frame,
