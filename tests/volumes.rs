@@ -106,11 +106,14 @@ fn the_surface_is_refined() {
 fn a_homogeneous_cube_lets_through_what_the_law_of_beer_says() {
     const SIZE: usize = 33;
     let alpha: f64 = 0.02;
-    for (order, steps) in [("FrontToBack", 256), ("BackToFront", 256), ("FrontToBack", 40), ("BackToFront", 1000)] {
+    // The last one is a slab half as deep as it is wide.
+    let views = [("FrontToBack", 256, 1.0), ("BackToFront", 256, 1.0), ("FrontToBack", 40, 1.0), ("BackToFront", 1000, 0.5)];
+    for (order, steps, depth) in views {
         let values = run(
             &format!(
                 r#""fog": VolumeShape(shape: Box, size: 2, resolution: 8),
-                   "seen": VolumeRender(volume: "fog", order: {order}, steps: {steps}, alpha_center: {}, camera: (size: (33, 33)))"#,
+                   "seen": VolumeRender(volume: "fog", order: {order}, steps: {steps}, alpha_center: {},
+                                       camera: (size: (33, 33), extent: (1, 1, {depth})))"#,
                 1.5 - alpha
             ),
             r#""out": "seen""#,
@@ -119,7 +122,8 @@ fn a_homogeneous_cube_lets_through_what_the_law_of_beer_says() {
             let d = direction(i % SIZE, i / SIZE, SIZE);
             let (mut enter, mut leave) = (0.0_f64, f64::INFINITY);
             for k in 0..3 {
-                let (a, b) = ((0.0 - EYE[k]) / d[k], (1.0 - EYE[k]) / d[k]);
+                let half = if k == 2 { depth / 2.0 } else { 0.5 };
+                let (a, b) = ((0.5 - half - EYE[k]) / d[k], (0.5 + half - EYE[k]) / d[k]);
                 (enter, leave) = (enter.max(a.min(b)), leave.min(a.max(b)));
             }
             let length = (leave - enter).max(0.0);
