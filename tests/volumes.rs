@@ -8,7 +8,7 @@ use std::path::Path;
 
 use pipe::run::{Job, Session};
 use pipe_graph::pass::Limits;
-use pipe_graph::reference::Tensor;
+use pipe_graph::reference::{Block, Tensor};
 use pipe_graph::types::EdgeType;
 use pipe_tests::bench::{Bench, Values, compile};
 use pipe_tests::source::{edge, edge_type};
@@ -308,6 +308,55 @@ fn a_volume_larger_than_the_budget_says_so_before_it_is_made() {
     let limits = Limits { budget: Some(300 << 20), ..Default::default() };
     let error = pipe_tests::bench::plan(&graph, &limits, &pipe_plan::Options { budget: limits.budget, ..Default::default() }).unwrap_err();
     assert!(error.contains("MiB") || error.contains("GiB"), "{error}");
+}
+
+#[test]
+fn files_that_cannot_hold_an_output_are_told() {
+    let folder = tempfile::tempdir().unwrap();
+    let graph = folder.path().join("all.ron");
+    let nodes = r#""v": VolumeShape(resolution: 8), "m": MarchingCubes(volume: "v"), "s": VolumeSlice(volume: "v")"#;
+    std::fs::write(&graph, graph_text(nodes, r#""volume": "v", "mesh": "m", "image": "s""#)).unwrap();
+    let mut session = Session::open(&pipe_gpu::Choice::parse(&std::env::var("PIPE_DEVICE").unwrap_or_default()), None).unwrap();
+    for (output, file, what) in [
+        ("volume", "a.png", "`volume` is Volume 8x8x8, 1 channel, which `a.png` cannot hold"),
+        ("mesh", "a.nrrd", "end the file's name in one of .obj .ply"),
+        ("image", "a.ply", "`image` is Image 8x8"),
+    ] {
+        let mut job = Job::new(&graph.display().to_string());
+        job.bind_output(output, file).unwrap();
+        let error = session.run(&job).unwrap_err().to_string();
+        assert!(error.contains(what), "{error}");
+    }
+}
+
+/// Values of `scipy.ndimage` 1.17: `gaussian_filter(v, 0.8, radius=3)` with modes nearest and wrap, `zoom(v, 2, order=1,
+/// mode="nearest", grid_mode=True)`, and of `numpy.gradient`.
+#[test]
+fn filters_agree_with_scipy() {
+    let size = [7, 5, 4];
+    let block = Block::from_fn(size, 1, |x, y, z| [f64::from(((3 * x + 5 * y + 7 * z) % 11) as f32 / 11.0); 4]);
+    let nodes = r#""blur": VolumeBlur(volume: "v", sigma: 0.8), "wrap": VolumeBlur(volume: "v", sigma: 0.8, options: (border: Repeat)),
+        "zoom": VolumeResample(volume: "v", resolution: [14, 10, 8]), "shrink": VolumeResample(volume: "v", resolution: [7, 5, 2]),
+        "gradient": VolumeGradient(volume: "v")"#;
+    let outputs = ["blur", "wrap", "zoom", "shrink", "gradient"].map(|n| format!(r#""{n}": "{n}""#)).join(", ");
+    let text = format!(r#"Graph(version: 1, inputs: {{"v": Volume}}, nodes: {{{nodes}}}, outputs: {{{outputs}}})"#);
+    let graph = compile(&text, &[("v", EdgeType::volume(size, 1))]).unwrap_or_else(|e| panic!("{e}"));
+    let values = Bench::new().gpu(&graph, &|_| Tensor::Volume(block.clone())).unwrap();
+    let check = |name: &str, size: [usize; 2], points: &[[usize; 3]], expected: &[f64]| {
+        for ([x, y, z], expected) in points.iter().zip(expected) {
+            let got = values[name][(z * size[1] + y) * size[0] + x];
+            assert!((got - expected).abs() < 1e-6, "{name} at {x}, {y}, {z}: {got}, not {expected}");
+        }
+    };
+    let points = [[0, 0, 0], [3, 2, 1], [6, 4, 3], [5, 0, 2]];
+    check("blur", [7, 5], &points, &[0.2790582, 0.4475671, 0.458806, 0.4424081]);
+    check("wrap", [7, 5], &points, &[0.4297193, 0.449155, 0.4692885, 0.4416446]);
+    check("zoom", [14, 10], &[[0, 0, 0], [7, 4, 3], [13, 9, 7], [6, 1, 5]], &[0.0, 0.4303977, 0.3636364, 0.3892045]);
+    check("shrink", [7, 5], &[[0, 0, 0], [3, 2, 1], [6, 4, 0]], &[0.2727273, 0.3636364, 0.3522727]);
+    let at = 4 * ((5 + 2) * 7 + 3);
+    for (got, expected) in values["gradient"][at..at + 3].iter().zip([1.9090909, -0.2272727, -1.4545455]) {
+        assert!((got - expected).abs() < 1e-5, "gradient: {got}, not {expected}");
+    }
 }
 
 /// Buffers that a shader binds have a largest size: volumes cross the rim in bands of slices.
