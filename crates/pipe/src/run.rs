@@ -343,7 +343,7 @@ impl Session {
                     images.push((target, form.picture(size[0], size[1], bytes, metadata)));
                 }
                 Packed::Volume { path, ty, spacing, voxel } => {
-                    volumes.push((path, Volume::of_floats(ty.size, ty.channels, spacing, &readback::floats(&bytes), voxel)));
+                    volumes.push((path, Volume::of_bytes(ty.size, ty.channels, spacing, bytes, voxel)));
                 }
                 Packed::Mesh(_) => unreachable!("taken above"),
                 Packed::Data(file) => data.push((file, bytes)),
