@@ -5,8 +5,14 @@ pub(crate) mod camera;
 mod cube_table;
 mod gradient;
 mod isosurface;
+mod light;
 mod marching_cubes;
 mod maximum_intensity;
+mod medium;
+mod phase;
+mod photon_scatter;
+mod photon_twin;
+mod random;
 pub(crate) mod resolution;
 mod volume_blur;
 mod volume_gradient;
@@ -20,6 +26,7 @@ use pipe_graph::node::Kind;
 
 /// The kinds of this section, in the order of the reference.
 pub(crate) const KINDS: &[Kind] = &[
+    photon_scatter::KIND,
     isosurface::KIND,
     volume_render::KIND,
     marching_cubes::KIND,
