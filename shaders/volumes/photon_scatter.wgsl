@@ -11,6 +11,7 @@
 // walks a photon or when. Sums are integers: no result depends on their order. In `score` stand what `photon.wgsl` names;
 // a weight of 1 is 2²⁸ there, and weights are rounded so that what a photon leaves behind adds up to 1 exactly.
 
+import package::lib::phase::scatter;
 import package::lib::random::{exponential, open_unit, philox, tausworthe};
 import package::lib::sine::sin_pi;
 
@@ -265,7 +266,7 @@ fn collide(photon: ptr<function, Photon>, path_sigma: f32) {
         add_wide(voxel_entry(place) + 2, absorbed, 0u);
     }
     (*photon).weight = left;
-    (*photon).direction = scatter((*photon).direction, open_unit(words.y), open_unit(words.z));
+    (*photon).direction = scatter(PHASE, params.g, (*photon).direction, open_unit(words.y), open_unit(words.z));
 }
 
 fn each(lane: i32) {

@@ -132,7 +132,7 @@ impl Emitter {
     pub(super) fn at(&self, p: DVec3) -> Option<Arrival> {
         let aside = p - self.origin;
         if matches!(self.light, Light::Point { .. }) {
-            let distance = aside.length();
+            let distance = aside.length().max(1e-6);
             return Some(Arrival { towards: -aside / distance, distance, irradiance: 1.0 / (4.0 * PI * distance * distance) });
         }
         let area = self.sides[0].length_squared();

@@ -7,6 +7,8 @@ use glam::DVec3;
 use pipe_graph::lowering::PassBuilder;
 use pipe_graph::prelude::*;
 
+use super::camera::Ray;
+use super::light::Arrival;
 use crate::shader;
 
 /// A medium written in the graph, or a volume that holds σt, interpolated trilinearly; what is below 0 counts as 0.
@@ -206,5 +208,27 @@ impl<'a> Extinction<'a> {
     /// Whether σt is the same everywhere.
     pub(super) const fn is_homogeneous(&self) -> bool {
         self.volume.is_none() && matches!(self.formula, Formula::Homogeneous { .. })
+    }
+
+    /// ∫σt on the way from a point of the cube to a light, in this many pieces.
+    pub(super) fn depth_to(&self, p: DVec3, light: &Arrival, pieces: u32) -> f64 {
+        let leave = Ray { origin: p, direction: light.towards }.cube_span().map_or(0.0, |span| span[1]);
+        let piece = light.distance.min(leave) / f64::from(pieces);
+        (0..pieces).map(|i| self.at(p + (f64::from(i) + 0.5) * piece * light.towards) * piece).sum()
+    }
+
+    /// What a ray sees of light that is scattered towards the eye (`scattered`: radiance for each unit of σt), and the
+    /// opacity of the medium, by this many pieces in each of which both are constant.
+    pub(super) fn seen(&self, ray: &Ray, pieces: u32, scattered: impl Fn(DVec3) -> f64) -> [f64; 4] {
+        let Some([enter, leave]) = ray.cube_span() else { return [0.0; 4] };
+        let piece = (leave - enter) / f64::from(pieces);
+        let (mut radiance, mut depth) = (0.0_f64, 0.0_f64);
+        for i in 0..pieces {
+            let p = ray.at(enter + (f64::from(i) + 0.5) * piece);
+            let sigma = self.at(p);
+            radiance += (-depth).exp() * -(-sigma * piece).exp_m1() * scattered(p);
+            depth += sigma * piece;
+        }
+        [radiance, radiance, radiance, -(-depth).exp_m1()]
     }
 }

@@ -32,7 +32,7 @@ impl Phase {
         }
     }
 
-    /// The constant `PHASE` of `phase.wgsl`.
+    /// Its number in `lib/phase.wgsl`.
     pub(super) const fn code(self) -> i32 {
         match self {
             Self::Isotropic => 0,
@@ -41,7 +41,7 @@ impl Phase {
         }
     }
 
-    /// The parameter `g` of `phase.wgsl`.
+    /// Its mean cosine.
     pub(super) const fn g(self) -> f32 {
         match self {
             Self::HenyeyGreenstein { g } => g,

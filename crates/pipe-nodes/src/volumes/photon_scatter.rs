@@ -16,6 +16,7 @@ use pipe_graph::node::scalar;
 use pipe_graph::prelude::*;
 use smart_default::SmartDefault;
 
+use super::dispatches::Dispatches;
 use super::light::Light;
 use super::medium::{self, Extinction, Inside, Medium};
 use super::phase::Phase;
@@ -147,35 +148,11 @@ pub(super) const KIND: Kind = Kind::of::<PhotonScatter>(
 /// Words of `tallies` and `score` before the voxels, and where they stand: see `photon.wgsl`.
 const VOXELS: u32 = 20;
 
-/// How the work is cut into dispatches.
-struct Cut {
-    /// Threads.
-    lanes: u32,
-    /// Steps that each takes in a dispatch.
-    steps: u32,
-    /// Dispatches between two questions whether all photons have ended.
-    every: u32,
-}
-
-impl Cut {
-    /// Some milliseconds a dispatch; a few tens between two questions.
-    fn new(profile: Profile, batch: u32) -> Self {
-        let (most, steps, every) = match profile {
-            Profile::Gpu => (131_072, 32, 8),
-            Profile::Cpu => (2048, 128, 4),
-        };
-        Self { lanes: batch.next_multiple_of(64).min(most), steps, every }
-    }
-
-    /// Dispatches after which every photon has ended or taken 2²⁴ steps.
-    fn most(&self, batch: u32) -> u32 {
-        let each = (1_u64 << 24) / u64::from(self.steps) + 1;
-        u32::try_from(u64::from(batch.div_ceil(self.lanes)) * each).unwrap_or(u32::MAX)
-    }
-}
-
 /// Words that a lane keeps.
 const LANE: u32 = 15;
+
+/// More steps than any photon should take, as in `photon_scatter.wgsl`.
+const MOST_STEPS: u64 = 1 << 24;
 
 impl Node for PhotonScatter {
     fn open(&mut self, _: &Opening<'_>) -> Result<(), Mistake> {
@@ -308,21 +285,21 @@ impl PhotonScatter {
     /// A batch of photons; answers the counts with it.
     fn batch(&self, cx: &mut Lowering<'_>, inside: &Inside, tallies: ResourceId) -> Result<ResourceId, Mistake> {
         let batch = self.photons.div_ceil(self.batches.min(self.photons));
-        let cut = Cut::new(cx.limits().profile, batch);
-        let lanes = cx.intermediate("lanes", Shape::uints(LANE * cut.lanes));
+        let dispatches = Dispatches::new(cx.limits().profile, batch);
+        let lanes = cx.intermediate("lanes", Shape::uints(LANE * dispatches.lanes));
         let score = cx.intermediate("score", Shape::uints(self.score_len()));
         cx.pass("batch", counting(&shader!("volumes/photon_batch"), ""))
             .entry(Entry::Each)
-            .grid(Grid::Elements([(LANE * cut.lanes).max(self.score_len()), 1, 1]))
+            .grid(Grid::Elements([(LANE * dispatches.lanes).max(self.score_len()), 1, 1]))
             .read("tallies", tallies, Reach::Whole)
             .write("lanes", lanes)
             .write("score", score)
             .param("batch", batch)
             .add();
         let left = cx.intermediate("left", Shape::Scalar);
-        let count = Count::Until { value: left, limit: 0.5, every: cut.every, max: cut.most(batch) };
+        let count = dispatches.until(left, batch, MOST_STEPS);
         let walked = cx.repeat("walks", count, &[lanes, score], |cx, states| {
-            let walked = self.walk(cx, inside, &cut, [states[0], states[1]]);
+            let walked = self.walk(cx, inside, &dispatches, [states[0], states[1]]);
             cx.pass("left", counting(&shader!("volumes/photon_left"), "")).read("score", walked[1], Reach::Whole).write("out", left).add();
             Ok(walked.to_vec())
         })?;
@@ -338,22 +315,22 @@ impl PhotonScatter {
     }
 
     /// One dispatch.
-    fn walk(&self, cx: &mut Lowering<'_>, inside: &Inside, cut: &Cut, [lanes, score]: [ResourceId; 2]) -> [ResourceId; 2] {
+    fn walk(&self, cx: &mut Lowering<'_>, inside: &Inside, dispatches: &Dispatches, [lanes, score]: [ResourceId; 2]) -> [ResourceId; 2] {
         let seed = cx.seed();
         let walked = [lanes, score].map(|id| {
             let shape = cx.shape(id);
             cx.intermediate("walked", shape)
         });
         let varies = !inside.is_homogeneous();
-        let parts = [shader!("volumes/photon"), shader!("volumes/light"), shader!("volumes/phase")];
+        let parts = [shader!("volumes/photon"), shader!("volumes/light")];
         let pass = inside
             .pass(cx, "walk", &shader!("volumes/photon_scatter"), &parts)
             .entry(Entry::Each)
-            .grid(Grid::Elements([cut.lanes, 1, 1]))
+            .grid(Grid::Elements([dispatches.lanes, 1, 1]))
             .write_as("lanes", walked[0], Access::Update, Some(lanes))
             .write_as("score", walked[1], Access::AtomicUpdate, Some(score))
-            .constant("LANES", cut.lanes as i32)
-            .constant("STEPS", cut.steps as i32)
+            .constant("LANES", dispatches.lanes as i32)
+            .constant("STEPS", dispatches.steps as i32)
             .constant("PERIODIC", self.boundary == Boundary::PeriodicXZ)
             .constant("TRACK", self.estimator == Estimator::TrackLength)
             .constant("MARCH", varies && self.tracking == Tracking::March)
