@@ -340,7 +340,12 @@ impl<'de> de::Deserializer<'de> for TreeDeserializer<'_> {
             Syntax::Float(v) => self.place(visitor.visit_f64(*v)),
             Syntax::Text(text) if text.starts_with('=') => {
                 let v = evaluate(text, self.tree.span, self.cx.env)?;
-                self.place(visitor.visit_f64(v))
+                // Where any type will do, a whole number may be meant as one.
+                if v.trunc() == v && (0.0..9e15).contains(&v) {
+                    self.place(visitor.visit_u64(v as u64))
+                } else {
+                    self.place(visitor.visit_f64(v))
+                }
             }
             Syntax::Text(text) => self.place(visitor.visit_str(text)),
             Syntax::None => self.place(visitor.visit_none()),
