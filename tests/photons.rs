@@ -286,3 +286,69 @@ fn unscattered_light_leaves_through_the_face_that_it_meets() {
     let v = photons(&mut bench, "medium: Homogeneous(1), light: Beam([2, 3, 4], [0.1, 0.9, 0.2]), resolution: 2, photons: 100");
     assert_eq!(v["faces"], [0.0, 0.0, 0.0, 1.0, 0.0, 0.0]);
 }
+
+/// Pearson's χ² of how often values fall between edges, less its mean, in standard deviations of χ².
+fn surprise(values: &[f64], edges: &[f64], share: impl Fn(f64, f64) -> f64) -> f64 {
+    let bins = edges.len() - 1;
+    let mut counts = vec![0.0; bins];
+    for v in values {
+        counts[edges.partition_point(|e| e <= v).clamp(1, bins) - 1] += 1.0;
+    }
+    let expected = |i: usize| share(edges[i], edges[i + 1]) * values.len() as f64;
+    let squared: f64 = (0..bins).map(|i| (counts[i] - expected(i)).powi(2) / expected(i)).sum();
+    (squared - (bins - 1) as f64) / (2.0 * (bins - 1) as f64).sqrt()
+}
+
+#[test]
+fn directions_are_distributed_as_the_phase_functions_say() {
+    let mut bench = Bench::new();
+    let n = 100_000;
+    let even = |from: f64, to: f64, bins: i32| (0..=bins).map(|i| from + (to - from) * f64::from(i) / f64::from(bins)).collect::<Vec<_>>();
+    let rayleigh = |mu: f64| (mu * mu * mu + 3.0 * mu + 4.0) / 8.0;
+    let henyey = |g: f64, mu: f64| (1.0 - g * g) / (2.0 * g) * ((1.0 + g * g - 2.0 * g * mu).powf(-0.5) - 1.0 / (1.0 + g));
+    for (phase, g) in [(0, 0.0), (1, 0.0), (2, 0.75), (2, -0.4), (2, 0.98), (2, 0.001)] {
+        for direction in ["0, 0, 1", "0.6, -0.64, -0.48"] {
+            let text = format!(
+                r#"Graph(version: 1, inputs: {{}}, nodes: {{"s": Scattered(phase: {phase}, g: {g}, direction: ({direction}), count: {n})}}, outputs: {{"out": "s"}})"#
+            );
+            let graph = compile(&text, &[]).unwrap_or_else(|e| panic!("{e}"));
+            let drawn = bench.gpu(&graph, &volume).unwrap_or_else(|e| panic!("{e}")).remove("out").unwrap_or_default();
+            let cosines: Vec<f64> = drawn.iter().step_by(2).copied().collect();
+            let turns: Vec<f64> = drawn.iter().skip(1).step_by(2).copied().collect();
+            let below = |mu: f64| match phase {
+                0 => (mu + 1.0) / 2.0,
+                1 => rayleigh(mu),
+                _ => henyey(g, mu),
+            };
+            let what = format!("phase {phase}, g {g}, along {direction}");
+            let mean = cosines.iter().sum::<f64>() / f64::from(n);
+            agree(&what, mean, g, 1.0 / f64::from(n).sqrt(), 3.0);
+            // Narrow bins where nearly all light goes.
+            let edges = if g > 0.9 { even(0.9, 1.0, 40) } else { even(-1.0, 1.0, 40) };
+            let inside: Vec<f64> = cosines.into_iter().filter(|mu| *mu >= edges[0]).collect();
+            let all = below(1.0) - below(edges[0]);
+            let odd = surprise(&inside, &edges, |a, b| (below(b) - below(a)) / all);
+            assert!(odd < 4.0, "{what}: cosines are {odd:.1} deviations off");
+            let odd = surprise(&turns, &even(0.0, 1.0, 36), |a, b| b - a);
+            assert!(odd < 4.0, "{what}: turns are {odd:.1} deviations off");
+        }
+    }
+}
+
+#[test]
+fn a_sum_that_overflows_does_not_look_right() {
+    let mut bench = Bench::new();
+    let text = r#"Graph(version: 1, inputs: {"before": Table}, nodes: {
+        "p": PhotonScatter(medium: Homogeneous(5), light: Point([0.5, 0.5, 0.5]), resolution: 1, photons: 100, earlier: "before"),
+    }, outputs: {"fluence": "p.fluence", "error": "p.error"})"#;
+    let graph = compile(text, &[("before", EdgeType::table(25, Element::U32))]).unwrap_or_else(|e| panic!("{e}"));
+    for (high, overflows) in [(0xffff_ffff_u32, true), (0x7fff_ffff, false)] {
+        // Ten photons in one batch, and a fluence whose low word is about to be carried into the high one.
+        let mut before = vec![0.0; 25];
+        (before[0], before[1], before[2]) = (10.0, 1.0, 10.0);
+        (before[20], before[21]) = (4_294_967_295.0, f64::from(high));
+        let v = bench.gpu(&graph, &|_| Tensor::Table(before.clone())).unwrap_or_else(|e| panic!("{e}"));
+        assert_eq!(v["fluence"][0].is_nan(), overflows);
+        assert_eq!(v["error"][0].is_nan(), overflows);
+    }
+}

@@ -1,5 +1,5 @@
-//! Every preset that takes one image or one volume, from file to file, against its twin in double precision and against a picture that
-//! the twin made earlier.
+//! Every preset that takes one image, one volume or nothing, from file to file, against its twin in double precision and
+//! against a picture that the twin made earlier.
 //!
 //! `PIPE_BLESS=1 cargo test -p pipe-tests --test presets` writes the pictures anew, from the twin, never from the GPU.
 
@@ -51,13 +51,22 @@ fn lumps() -> Block {
 
 /// What a preset is given: a file, and the same in double precision.
 struct Subject {
-    file: String,
-    value: Tensor,
-    ty: EdgeType,
+    input: Option<(String, Tensor, EdgeType)>,
     settings: Vec<(String, String)>,
 }
 
+/// Little work for presets that take nothing.
+const SMALL: [(&str, &str); 2] =
+    [("cloud-chamber", "size=56 photons=40000 voxels=14"), ("fog-light", "width=64 height=36 photons=20000 voxels=14 paths=4")];
+
 impl Subject {
+    /// For a preset without inputs; `None` for one that makes no picture.
+    fn nothing(preset: &str) -> Option<Self> {
+        let (_, settings) = SMALL.iter().find(|(name, _)| *name == preset)?;
+        let settings = settings.split(' ').filter_map(|s| s.split_once('=')).map(|(name, value)| (name.to_owned(), value.to_owned()));
+        Some(Self { input: None, settings: settings.collect() })
+    }
+
     /// `None` for presets that take something else.
     fn of(kind: EdgeKind, folder: &std::path::Path) -> Option<Self> {
         match kind {
@@ -65,7 +74,7 @@ impl Subject {
                 let file = path(INPUT);
                 let picture = raster(&read(&file));
                 let ty = EdgeType::image(picture.size, 4);
-                Some(Self { file, value: Tensor::Image(picture), ty, settings: Vec::new() })
+                Some(Self { input: Some((file, Tensor::Image(picture), ty)), settings: Vec::new() })
             }
             EdgeKind::Volume => {
                 let (file, block) = (folder.join("lumps.nrrd"), lumps());
@@ -74,7 +83,7 @@ impl Subject {
                 pipe_io::volume::write(&file, &volume).unwrap_or_else(|e| panic!("{e}"));
                 let ty = EdgeType::volume(block.size, 1);
                 let settings = vec![("size".to_owned(), "96".to_owned())];
-                Some(Self { file: file.display().to_string(), value: Tensor::Volume(block), ty, settings })
+                Some(Self { input: Some((file.display().to_string(), Tensor::Volume(block), ty)), settings })
             }
             _ => None,
         }
@@ -106,48 +115,55 @@ fn presets_agree_with_their_twins_and_goldens() {
     let folder = tempfile::tempdir().expect("a folder");
     let bless = std::env::var_os("PIPE_BLESS").is_some();
     let (mut seen, mut wrong) = (0, Vec::new());
-    for name in presets::names() {
-        let mut project = Project::open(name).unwrap_or_else(|e| panic!("{e}"));
+    for preset in presets::names() {
+        let mut project = Project::open(preset).unwrap_or_else(|e| panic!("{e}"));
         let document = project.document.clone().expect("presets parse");
-        if document.inputs.len() != 1 || document.outputs.len() != 1 {
-            continue;
-        }
-        let Some(subject) = Subject::of(document.inputs[0].kind, folder.path()) else { continue };
-        seen += 1;
+        let subject = match document.inputs.as_slice() {
+            [] => Subject::nothing(preset),
+            [input] => Subject::of(input.kind, folder.path()),
+            _ => None,
+        };
+        let Some(subject) = subject else { continue };
+        let given = |value: EdgeType| (document.inputs[0].name.value.clone(), value);
         let request = Request {
-            inputs: [(document.inputs[0].name.value.clone(), subject.ty)].into(),
+            inputs: subject.input.iter().map(|(_, _, ty)| given(*ty)).collect(),
             settings: subject.settings.clone(),
             frame: 1.0,
             ..Request::default()
         };
         let graph = project.resolve(&request, &World::default()).unwrap_or_else(|| panic!("{}", project.render(false)));
-        let twin = evaluate(&graph, &|_| subject.value.clone());
-        let (_, value) = graph.outputs().next().expect("it has one output");
-        let Some(Tensor::Image(twin)) = twin.get(&value) else { panic!("{name} makes no image") };
-
-        let out = folder.path().join(format!("{name}.png")).display().to_string();
-        let mut job = Job::new(name);
-        job.settings = subject.settings;
-        job.bind_input(&document.inputs[0].name.value, &subject.file);
-        job.bind_output(&document.outputs[0].0.value, &out).expect("a png");
-        session.run(&job).unwrap_or_else(|e| panic!("{name}: {e}"));
-        let got = read(&out);
-        let channels = got.channels.count();
-        let expected: Vec<i32> = twin.pixels.iter().flat_map(|p| stored(*p, channels)).collect();
-        let golden = path(&format!("golden/{name}.png"));
-        if bless {
-            let bytes = expected.iter().map(|v| *v as u8).collect();
-            let target = pipe_io::Target::parse(&golden).expect("a png");
-            let options =
-                pipe_io::WriteOptions { channels: Some(got.channels), compression: Some(pipe_io::Compression::Best), ..Default::default() };
-            pipe_io::write(&target, &Picture { bytes, ..got.clone() }, &options).unwrap_or_else(|e| panic!("{e}"));
-        }
-        for (what, other) in [("its twin", &expected), ("its golden", &bytes(&read(&golden)))] {
-            let off = bytes(&got).iter().zip(other).map(|(a, b)| (a - b).abs()).max().unwrap_or(i32::MAX);
-            let count = bytes(&got).iter().zip(other).filter(|(a, b)| (*a - *b).abs() > ALLOWED).count();
-            // A value on the edge of a level may fall to either side; a few in a thousand may.
-            if bytes(&got).len() != other.len() || count * 500 > other.len() {
-                wrong.push(format!("{name} is off {what} by up to {off}, more than {ALLOWED} at {count} of {} samples", other.len()));
+        let twins = evaluate(&graph, &|_| subject.input.as_ref().expect("it asks for its input").1.clone());
+        for (output, value) in graph.outputs() {
+            seen += 1;
+            let Some(Tensor::Image(twin)) = twins.get(&value) else { panic!("{preset} makes no image") };
+            // Presets with several pictures have a golden for each.
+            let name = if graph.outputs().count() == 1 { preset.to_owned() } else { format!("{preset}-{output}") };
+            let out = folder.path().join(format!("{name}.png")).display().to_string();
+            let mut job = Job::new(preset);
+            job.settings.clone_from(&subject.settings);
+            if let Some((file, ..)) = &subject.input {
+                job.bind_input(&document.inputs[0].name.value, file);
+            }
+            job.bind_output(output, &out).expect("a png");
+            session.run(&job).unwrap_or_else(|e| panic!("{name}: {e}"));
+            let got = read(&out);
+            let channels = got.channels.count();
+            let expected: Vec<i32> = twin.pixels.iter().flat_map(|p| stored(*p, channels)).collect();
+            let golden = path(&format!("golden/{name}.png"));
+            if bless {
+                let bytes = expected.iter().map(|v| *v as u8).collect();
+                let target = pipe_io::Target::parse(&golden).expect("a png");
+                let compression = Some(pipe_io::Compression::Best);
+                let options = pipe_io::WriteOptions { channels: Some(got.channels), compression, ..Default::default() };
+                pipe_io::write(&target, &Picture { bytes, ..got.clone() }, &options).unwrap_or_else(|e| panic!("{e}"));
+            }
+            for (what, other) in [("its twin", &expected), ("its golden", &bytes(&read(&golden)))] {
+                let off = bytes(&got).iter().zip(other).map(|(a, b)| (a - b).abs()).max().unwrap_or(i32::MAX);
+                let count = bytes(&got).iter().zip(other).filter(|(a, b)| (*a - *b).abs() > ALLOWED).count();
+                // A value on the edge of a level may fall to either side; a few in a thousand may.
+                if bytes(&got).len() != other.len() || count * 500 > other.len() {
+                    wrong.push(format!("{name} is off {what} by up to {off}, more than {ALLOWED} at {count} of {} samples", other.len()));
+                }
             }
         }
     }

@@ -34,7 +34,8 @@ use crate::shader;
 #[derive(Debug, SmartDefault, Serialize, Deserialize, JsonSchema)]
 #[serde(default)]
 pub(super) struct PhotonScatter {
-    /// What light travels through: `Homogeneous(sigma_t)`, a Volume of σt, or `CloudChamber(density_scale)`.
+    /// What light travels through: `Homogeneous(sigma_t)`, a Volume of σt, `Scaled(volume, sigma_t)` or
+    /// `CloudChamber(density_scale)`.
     #[default(medium::homogeneous())]
     medium: Medium,
     /// Voxels of the results: a number, or [x, y, z].
@@ -128,7 +129,7 @@ pub(super) const KIND: Kind = Kind::of::<PhotonScatter>(
         r#"PhotonScatter(medium: Homogeneous(2), resolution: [2, 5, 3], photons: 120, phase: HenyeyGreenstein(0.75), boundary: PeriodicXZ, light: Plane([0.5, 1, 0.5], [0, -1, 0], 1), estimator: TrackLength, seed: 3)"#,
         r#"PhotonScatter(medium: "fog", resolution: 4, photons: 100, phase: Rayleigh, light: Beam([-0.2, 0.4, 0.3], [1, 0.1, 0.2]), tracking: Delta)"#,
         r#"PhotonScatter(medium: CloudChamber, resolution: 4, photons: 60, tracking: Delta, random: Tausworthe, min_energy: 0.5)"#,
-        r#"PhotonScatter(medium: "fog", resolution: 3, photons: 60, albedo: 0.5, step: 0.02, estimator: TrackLength, random: Tausworthe)"#,
+        r#"PhotonScatter(medium: Scaled("fog", 2), resolution: 3, photons: 60, albedo: 0.5, step: 0.02, estimator: TrackLength, random: Tausworthe)"#,
     ],
 )
 .ports(&[
