@@ -142,7 +142,36 @@ fn a_slab_reflects_and_transmits_as_published_to_four_digits() {
     agree("transmittance", t, 0.66096, 1.5 * error, 3.0);
 }
 
-/// Isotropic scattering without absorption: what is not reflected is transmitted, and a half-space reflects everything.
+/// Chandrasekhar's H function of isotropic scattering, from its integral equation (Radiative Transfer, 1960, section 38).
+fn chandrasekhar_h(albedo: f64, mu: f64) -> f64 {
+    let n = 400;
+    let nodes: Vec<f64> = (0..n).map(|i| (f64::from(i) + 0.5) / f64::from(n)).collect();
+    let next = |h: &[f64], mu: f64| {
+        let integral: f64 = nodes.iter().zip(h).map(|(m, h)| m * h / (mu + m) / f64::from(n)).sum();
+        1.0 / ((1.0 - albedo).sqrt() + 0.5 * albedo * integral)
+    };
+    let mut h = vec![1.0; nodes.len()];
+    for _ in 0..100 {
+        h = nodes.iter().map(|mu| next(&h, *mu)).collect();
+    }
+    next(&h, mu)
+}
+
+/// A half-space that scatters isotropically reflects 1 − √(1 − albedo)·H(1) of light that meets it squarely.
+#[test]
+fn a_half_space_reflects_what_chandrasekhar_says() {
+    let mut bench = Bench::new();
+    assert!((chandrasekhar_h(0.9, 1.0) - 1.8501).abs() < 1e-3, "{}", chandrasekhar_h(0.9, 1.0));
+    for albedo in [0.5, 0.9, 0.99] {
+        let n = 200_000;
+        let [r, t] = slab(&mut bench, 200.0, albedo, 0.0, n, 4);
+        let expected = 1.0 - (1.0 - albedo).sqrt() * chandrasekhar_h(albedo, 1.0);
+        agree(&format!("albedo {albedo}"), r, expected, 0.45 / f64::from(n).sqrt(), 3.0);
+        assert!(t < 1e-4);
+    }
+}
+
+/// Isotropic scattering without absorption: what is not reflected is transmitted.
 #[test]
 fn a_slab_that_absorbs_nothing_keeps_nothing() {
     let [r, t] = slab(&mut Bench::new(), 5.0, 1.0, 0.0, 50_000, 3);
@@ -172,6 +201,19 @@ fn collisions_and_paths_estimate_the_same_fluence() {
         let paths = photons(&mut bench, &format!("{base}, estimator: TrackLength, seed: 1"));
         let square = mean_square_difference(&collisions, &paths);
         assert!((0.6..1.5).contains(&square), "{medium}: {square}");
+    }
+}
+
+/// What is absorbed is (1 − albedo)·∫σt·Φ.
+#[test]
+fn fluence_is_absorbed_as_the_medium_says() {
+    let mut bench = Bench::new();
+    for estimator in ["Collision", "TrackLength"] {
+        let fields =
+            format!("medium: Homogeneous(6), {POINT}, albedo: 0.7, resolution: [4, 5, 6], photons: 100000, estimator: {estimator}");
+        let v = photons(&mut bench, &fields);
+        let absorbed = 0.3 * 6.0 * v["fluence"].iter().sum::<f64>() / 120.0;
+        assert!((absorbed / v["absorbed"][0] - 1.0).abs() < 0.01, "{estimator}: {absorbed} {}", v["absorbed"][0]);
     }
 }
 
