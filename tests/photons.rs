@@ -1,8 +1,9 @@
 //! Light in media: photons against formulas, published tables and each other.
 
+use pipe_graph::pass::Limits;
 use pipe_graph::prelude::*;
-use pipe_graph::reference::{Block, Tensor};
-use pipe_tests::bench::{Bench, Values, compile};
+use pipe_plan::Options;
+use pipe_tests::bench::{Bench, Values, compile, plan};
 
 /// Runs a PhotonScatter with these fields and answers all of its ports. `fog` is a volume of σt = 4 everywhere, `cloud`
 /// one that varies.
@@ -284,6 +285,27 @@ fn the_same_seed_gives_the_same_bits() {
     assert_ne!(first, photons(&mut bench, &base.replace("seed: 9", "seed: 10")));
 }
 
+/// Other numbers of threads and other lengths of dispatches, on the same device.
+#[test]
+fn how_work_is_cut_into_dispatches_changes_no_bit() {
+    let mut bench = Bench::new();
+    let camera = "camera: (eye: (0.6, 0.5, 0.9), fov: 60, size: (12, 12))";
+    for node in [
+        format!("PhotonScatter(medium: CloudChamber, {POINT}, resolution: 5, photons: 9000, tracking: Delta, batches: 2)"),
+        format!("PhotonScatter(medium: Homogeneous(9), {POINT}, resolution: 5, photons: 9000, random: Tausworthe, estimator: TrackLength)"),
+        format!("GatherWalk(medium: CloudChamber, light: Point([0.5, 0.9, 0.5]), {camera}, paths: 20)"),
+    ] {
+        let text = format!(r#"Graph(version: 1, inputs: {{}}, nodes: {{"a": {node}}}, outputs: {{"out": "a"}})"#);
+        let graph = compile(&text, &[]).unwrap_or_else(|e| panic!("{e}"));
+        let [gpu, cpu] = [Profile::Gpu, Profile::Cpu].map(|profile| {
+            let limits = Limits { profile, ..bench.limits() };
+            let plan = plan(&graph, &limits, &Options::default()).unwrap_or_else(|e| panic!("{e}"));
+            bench.run(&graph, plan, &volume).unwrap_or_else(|e| panic!("{e}"))
+        });
+        assert_eq!(gpu, cpu, "{node}");
+    }
+}
+
 #[test]
 fn more_photons_can_be_added_to_an_earlier_result() {
     let mut bench = Bench::new();
@@ -301,6 +323,24 @@ fn more_photons_can_be_added_to_an_earlier_result() {
     // The spread of twelve batches tells what that of four does.
     let sum = |v: &Values| v["error"].iter().sum::<f64>();
     assert!((0.6..1.7).contains(&(sum(&whole) / sum(&parts))), "{} {}", sum(&whole), sum(&parts));
+}
+
+/// Numbers that no medium has make it empty or dense, not endless.
+#[test]
+fn odd_densities_do_no_harm() {
+    let mut bench = Bench::new();
+    for (what, odd, absorbed) in [("NaN", f64::NAN, 0.0), ("below 0", -1e30, 0.0), ("infinity", f64::INFINITY, 1.0), ("huge", 1e30, 1.0)] {
+        for tracking in ["March", "Delta"] {
+            let text = format!(
+                r#"Graph(version: 1, inputs: {{"odd": Volume}}, nodes: {{
+                "p": PhotonScatter(medium: "odd", {POINT}, tracking: {tracking}, albedo: 0, resolution: 2, photons: 200)}}, outputs: {{"out": "p.absorbed"}})"#
+            );
+            let graph = compile(&text, &[("odd", EdgeType::volume([4, 4, 4], 1))]).unwrap_or_else(|e| panic!("{e}"));
+            let input = |_: &str| Tensor::Volume(Block::from_fn([4, 4, 4], 1, |_, _, _| [odd; 4]));
+            let v = bench.gpu(&graph, &input).unwrap_or_else(|e| panic!("{e}"));
+            assert!((v["out"][0] - absorbed).abs() < 1e-6, "{what}, {tracking}: {:?}", v["out"]);
+        }
+    }
 }
 
 #[test]

@@ -53,18 +53,24 @@ fn store_word(lane: i32, word: i32, v: u32) {
     store_lanes(word * LANES + lane, v);
 }
 
+fn store_float(lane: i32, word: i32, v: f32) {
+    store_word(lane, word, bitcast<u32>(v));
+}
+
 fn store_walk(lane: i32, walk: Walk) {
-    let floats = array<f32, 10>(
-        walk.place.x, walk.place.y, walk.place.z, walk.direction.x, walk.direction.y, walk.direction.z,
-        walk.throughput, walk.found, walk.shade, walk.shade_left,
-    );
-    for (var i = 0; i < 10; i++) {
-        store_word(lane, i, bitcast<u32>(floats[i]));
+    for (var i = 0; i < 3; i++) {
+        store_float(lane, i, walk.place[i]);
+        store_float(lane, 3 + i, walk.direction[i]);
     }
-    let words = array<u32, 5>(walk.pixel, walk.path, walk.bounces, walk.draws, walk.hits);
-    for (var i = 0; i < 5; i++) {
-        store_word(lane, 10 + i, words[i]);
-    }
+    store_float(lane, 6, walk.throughput);
+    store_float(lane, 7, walk.found);
+    store_float(lane, 8, walk.shade);
+    store_float(lane, 9, walk.shade_left);
+    store_word(lane, 10, walk.pixel);
+    store_word(lane, 11, walk.path);
+    store_word(lane, 12, walk.bounces);
+    store_word(lane, 13, walk.draws);
+    store_word(lane, 14, walk.hits);
 }
 
 /// Begins the next path of the pixel.

@@ -11,7 +11,7 @@ use super::camera::Ray;
 use super::light::Arrival;
 use crate::shader;
 
-/// A medium written in the graph, or a volume that holds σt, interpolated trilinearly; what is below 0 counts as 0.
+/// A medium written in the graph, or a volume that holds σt, interpolated trilinearly; what is below 0, or NaN, counts as 0.
 pub(super) type Medium = EdgeOr<Volume, Written>;
 
 /// A medium as a graph writes it.
@@ -46,6 +46,9 @@ pub(super) const fn homogeneous() -> Medium {
     EdgeOr::Value(Written::Homogeneous { sigma_t: 1.0 })
 }
 
+/// The largest σt that there is: in a volume what is larger, infinity too, counts as this.
+const MOST: f32 = 1e6;
+
 /// σt of the walls and the roof of the cloud chamber.
 const WALL: f32 = 100.0;
 
@@ -56,7 +59,7 @@ pub(super) fn check(medium: &Medium) -> Result<(), Mistake> {
         EdgeOr::Value(Written::Homogeneous { sigma_t } | Written::Scaled { sigma_t, .. }) => ("sigma_t", sigma_t),
         EdgeOr::Value(Written::CloudChamber { density_scale }) => ("density_scale", density_scale),
     };
-    if (0.0..=1e6).contains(value) {
+    if (0.0..=MOST).contains(value) {
         return Ok(());
     }
     Err(Mistake::in_field("medium", format!("{name} is {value}")).hint("expected 0 to 1e6"))
@@ -126,7 +129,10 @@ impl Inside {
             Filling::CloudChamber { density_scale } => cx.pass(suffix, shader).param("density_scale", density_scale).param("wall", WALL),
             Filling::Volume { port, sigma_t } => {
                 let volume = cx.input(&port);
-                cx.pass(suffix, shader).read_with("medium", volume, Reach::Whole, border, Filter::Linear).param("sigma_t", sigma_t)
+                cx.pass(suffix, shader)
+                    .read_with("medium", volume, Reach::Whole, border, Filter::Linear)
+                    .constant("MOST", MOST)
+                    .param("sigma_t", sigma_t)
             }
         }
     }
@@ -151,11 +157,12 @@ fn largest(cx: &mut Lowering<'_>, volume: ResourceId, sigma_t: f32) -> ResourceI
         terms = maxima;
     }
     let out = cx.intermediate("maximum", Shape::Scalar);
-    cx.pass("maximum", ending(&text, "fn at(i: i32) -> vec4f { return vec4f(params.sigma_t * strided_maximum(0)); }"))
+    cx.pass("maximum", ending(&text, "fn at(i: i32) -> vec4f { return vec4f(min(params.sigma_t * strided_maximum(0), MOST)); }"))
         .read("terms", terms, Reach::Whole)
         .write("out", out)
         .param("stride", 1_i32)
         .param("sigma_t", sigma_t)
+        .constant("MOST", MOST)
         .add();
     out
 }
@@ -178,7 +185,7 @@ impl<'a> Extinction<'a> {
             Filling::CloudChamber { density_scale } => (None, f64::from(WALL.max(0.5 * density_scale))),
             Filling::Volume { port, sigma_t } => {
                 let block = cx.volume(&port);
-                (Some(block), block.voxels.iter().map(|v| v[0]).fold(0.0, f64::max) * f64::from(sigma_t))
+                (Some(block), (block.voxels.iter().map(|v| v[0]).fold(0.0, f64::max) * f64::from(sigma_t)).min(f64::from(MOST)))
             }
         };
         Self { filling, volume, border: cx.border, majorant }
@@ -187,7 +194,9 @@ impl<'a> Extinction<'a> {
     /// σt at a point.
     pub(super) fn at(&self, p: DVec3) -> f64 {
         match (self.filling, self.volume) {
-            (Filling::Volume { sigma_t, .. }, Some(block)) => block.sample(p.to_array(), self.border)[0].max(0.0) * f64::from(sigma_t),
+            (Filling::Volume { sigma_t, .. }, Some(block)) => {
+                (block.sample(p.to_array(), self.border)[0].max(0.0) * f64::from(sigma_t)).min(f64::from(MOST))
+            }
             (Filling::CloudChamber { density_scale }, _) => cloud_chamber(p, f64::from(density_scale)),
             _ => self.majorant,
         }
