@@ -54,9 +54,9 @@ pub(super) struct PhotonScatter {
     /// Where photons begin: `Point([x, y, z])`, `Beam(origin, direction)` or `Plane(origin, normal, size)`. From outside
     /// of the cube they travel straight to it; those that miss it have escaped.
     light: Light,
-    /// Weight from which on a photon is absorbed as a whole or not at all.
+    /// Weight from which on a photon is absorbed as a whole or not at all; 0: never.
     #[default = 0.001]
-    #[schemars(range(min = 1e-6, max = 1.0))]
+    #[schemars(range(min = 0.0, max = 1.0))]
     min_energy: f32,
     /// What happens at the faces of the cube.
     boundary: Boundary,
