@@ -149,6 +149,9 @@ pub(super) const KIND: Kind = Kind::of::<PhotonScatter>(
 /// Words of `tallies` and `score` before the voxels, and where they stand: see `photon.wgsl`.
 const VOXELS: u32 = 20;
 
+/// Up to so many voxels in all there are several sets of them.
+const MOST_BANKED: u32 = 16384;
+
 /// Words that a lane keeps.
 const LANE: u32 = 15;
 
@@ -256,8 +259,13 @@ impl PhotonScatter {
         self.resolution.size().iter().product()
     }
 
+    /// Sets of voxels that threads count in: several where voxels are few.
+    fn banks(&self) -> u32 {
+        (MOST_BANKED / self.voxels()).clamp(1, 64)
+    }
+
     fn score_len(&self) -> u32 {
-        VOXELS + 4 * self.voxels()
+        VOXELS + 4 * self.voxels() * self.banks()
     }
 
     fn tallies_len(&self) -> u32 {
@@ -310,6 +318,7 @@ impl PhotonScatter {
             .grid(Grid::Elements([self.voxels() + 1, 1, 1]))
             .read("score", walked[1], Reach::Whole)
             .write_as("tallies", next, Access::Update, Some(tallies))
+            .constant("BANKS", self.banks() as i32)
             .param("voxels", self.voxels() as i32)
             .add();
         Ok(next)
@@ -331,6 +340,7 @@ impl PhotonScatter {
             .write_as("lanes", walked[0], Access::Update, Some(lanes))
             .write_as("score", walked[1], Access::AtomicUpdate, Some(score))
             .constant("LANES", dispatches.lanes as i32)
+            .constant("BANKS", self.banks() as i32)
             .constant("STEPS", dispatches.steps as i32)
             .constant("PERIODIC", self.boundary == Boundary::PeriodicXZ)
             .constant("TRACK", self.estimator == Estimator::TrackLength)
