@@ -398,7 +398,7 @@ fn directions_are_distributed_as_the_phase_functions_say() {
             let cosines: Vec<f64> = drawn.iter().step_by(2).copied().collect();
             let turns: Vec<f64> = drawn.iter().skip(1).step_by(2).copied().collect();
             let below = |mu: f64| match phase {
-                0 => (mu + 1.0) / 2.0,
+                0 => 0.5 * mu + 0.5,
                 1 => rayleigh(mu),
                 _ => henyey(g, mu),
             };
