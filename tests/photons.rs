@@ -289,11 +289,11 @@ fn the_same_seed_gives_the_same_bits() {
 #[test]
 fn how_work_is_cut_into_dispatches_changes_no_bit() {
     let mut bench = Bench::new();
-    let camera = "camera: (eye: (0.6, 0.5, 0.9), fov: 60, size: (12, 12))";
+    let camera = "camera: (eye: (0.6, 0.5, 0.9), fov: 60, size: (140, 120))";
     for node in [
         format!("PhotonScatter(medium: CloudChamber, {POINT}, resolution: 5, photons: 9000, tracking: Delta, batches: 2)"),
         format!("PhotonScatter(medium: Homogeneous(9), {POINT}, resolution: 5, photons: 9000, random: Tausworthe, estimator: TrackLength)"),
-        format!("GatherWalk(medium: CloudChamber, light: Point([0.5, 0.9, 0.5]), {camera}, paths: 20)"),
+        format!("GatherWalk(medium: CloudChamber, light: Point([0.5, 0.9, 0.5]), {camera}, paths: 2, max_bounces: 8)"),
     ] {
         let text = format!(r#"Graph(version: 1, inputs: {{}}, nodes: {{"a": {node}}}, outputs: {{"out": "a"}})"#);
         let graph = compile(&text, &[]).unwrap_or_else(|e| panic!("{e}"));

@@ -4,7 +4,7 @@
 //
 // Free paths are drawn by the largest σt, and collisions that are none are rejected (E. Woodcock et al. 1965); on a shadow
 // ray each lowers what arrives (ratio tracking: J. Novák et al. 2014). In a homogeneous medium (UNIFORM) both are exact
-// without. Random numbers are keyed by seed, pixel and path and counted by draw.
+// without. In `score` stands what `gather.wgsl` names. Random numbers are keyed by seed, pixel and path and counted by draw.
 
 import package::lib::phase::{phase_density, scatter};
 import package::lib::random::{exponential, open_unit, philox};
@@ -27,10 +27,6 @@ struct Walk {
     /// Paths that met the medium.
     hits: u32,
 }
-
-/// In `score`: pixels taken by threads, and done.
-const ISSUED = 0;
-const ENDED = 1;
 
 fn load_word(lane: i32, word: i32) -> u32 {
     return load_lanes(word * LANES + lane);
@@ -170,7 +166,7 @@ fn advance_path(walk: ptr<function, Walk>) {
 
 fn each(lane: i32) {
     var walk = load_walk(lane);
-    let pixels = u32(params.size.x * params.size.y);
+    let pixels = load_score(LIMIT);
     var ended = 0u;
     for (var step = 0; step < STEPS; step++) {
         if walk.pixel == 0u {
