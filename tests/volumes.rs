@@ -7,9 +7,11 @@ use std::collections::HashMap;
 use std::path::Path;
 
 use pipe::run::{Job, Session};
-use pipe_graph::reference::Tensor;
+use pipe_graph::pass::Limits;
+use pipe_graph::reference::{Block, Tensor};
 use pipe_graph::types::EdgeType;
 use pipe_tests::bench::{Bench, Values, compile};
+use pipe_tests::source::{edge, edge_type};
 
 type Vector = [f64; 3];
 
@@ -104,11 +106,14 @@ fn the_surface_is_refined() {
 fn a_homogeneous_cube_lets_through_what_the_law_of_beer_says() {
     const SIZE: usize = 33;
     let alpha: f64 = 0.02;
-    for (order, steps) in [("FrontToBack", 256), ("BackToFront", 256), ("FrontToBack", 40), ("BackToFront", 1000)] {
+    // The last one is a slab half as deep as it is wide.
+    let views = [("FrontToBack", 256, 1.0), ("BackToFront", 256, 1.0), ("FrontToBack", 40, 1.0), ("BackToFront", 1000, 0.5)];
+    for (order, steps, depth) in views {
         let values = run(
             &format!(
                 r#""fog": VolumeShape(shape: Box, size: 2, resolution: 8),
-                   "seen": VolumeRender(volume: "fog", order: {order}, steps: {steps}, alpha_center: {}, camera: (size: (33, 33)))"#,
+                   "seen": VolumeRender(volume: "fog", order: {order}, steps: {steps}, alpha_center: {},
+                                       camera: (size: (33, 33), extent: (1, 1, {depth})))"#,
                 1.5 - alpha
             ),
             r#""out": "seen""#,
@@ -117,7 +122,8 @@ fn a_homogeneous_cube_lets_through_what_the_law_of_beer_says() {
             let d = direction(i % SIZE, i / SIZE, SIZE);
             let (mut enter, mut leave) = (0.0_f64, f64::INFINITY);
             for k in 0..3 {
-                let (a, b) = ((0.0 - EYE[k]) / d[k], (1.0 - EYE[k]) / d[k]);
+                let half = if k == 2 { depth / 2.0 } else { 0.5 };
+                let (a, b) = ((0.5 - half - EYE[k]) / d[k], (0.5 + half - EYE[k]) / d[k]);
                 (enter, leave) = (enter.max(a.min(b)), leave.min(a.max(b)));
             }
             let length = (leave - enter).max(0.0);
@@ -299,9 +305,95 @@ fn a_volume_larger_than_the_budget_says_so_before_it_is_made() {
     let graph = compile(&text, &[]).unwrap();
     let EdgeType::Volume(ty) = graph.ty(graph.outputs().next().unwrap().1) else { panic!("it is a volume") };
     assert_eq!(ty.size, [512; 3]);
-    let limits = pipe_graph::pass::Limits { budget: Some(300 << 20), ..Default::default() };
+    let limits = Limits { budget: Some(300 << 20), ..Default::default() };
     let error = pipe_tests::bench::plan(&graph, &limits, &pipe_plan::Options { budget: limits.budget, ..Default::default() }).unwrap_err();
     assert!(error.contains("MiB") || error.contains("GiB"), "{error}");
+}
+
+#[test]
+fn files_that_cannot_hold_an_output_are_told() {
+    let folder = tempfile::tempdir().unwrap();
+    let graph = folder.path().join("all.ron");
+    let nodes = r#""v": VolumeShape(resolution: 8), "m": MarchingCubes(volume: "v"), "s": VolumeSlice(volume: "v")"#;
+    std::fs::write(&graph, graph_text(nodes, r#""volume": "v", "mesh": "m", "image": "s""#)).unwrap();
+    let mut session = Session::open(&pipe_gpu::Choice::parse(&std::env::var("PIPE_DEVICE").unwrap_or_default()), None).unwrap();
+    for (output, file, what) in [
+        ("volume", "a.png", "`volume` is Volume 8x8x8, 1 channel, which `a.png` cannot hold"),
+        ("mesh", "a.nrrd", "end the file's name in one of .obj .ply"),
+        ("image", "a.ply", "`image` is Image 8x8"),
+    ] {
+        let mut job = Job::new(&graph.display().to_string());
+        job.bind_output(output, file).unwrap();
+        let error = session.run(&job).unwrap_err().to_string();
+        assert!(error.contains(what), "{error}");
+    }
+}
+
+/// Values of `scipy.ndimage` 1.17: `gaussian_filter(v, 0.8, radius=3)` with modes nearest and wrap, `zoom(v, 2, order=1,
+/// mode="nearest", grid_mode=True)`, and of `numpy.gradient`.
+#[test]
+fn filters_agree_with_scipy() {
+    let size = [7, 5, 4];
+    let block = Block::from_fn(size, 1, |x, y, z| [f64::from(((3 * x + 5 * y + 7 * z) % 11) as f32 / 11.0); 4]);
+    let nodes = r#""blur": VolumeBlur(volume: "v", sigma: 0.8), "wrap": VolumeBlur(volume: "v", sigma: 0.8, options: (border: Repeat)),
+        "zoom": VolumeResample(volume: "v", resolution: [14, 10, 8]), "shrink": VolumeResample(volume: "v", resolution: [7, 5, 2]),
+        "gradient": VolumeGradient(volume: "v")"#;
+    let outputs = ["blur", "wrap", "zoom", "shrink", "gradient"].map(|n| format!(r#""{n}": "{n}""#)).join(", ");
+    let text = format!(r#"Graph(version: 1, inputs: {{"v": Volume}}, nodes: {{{nodes}}}, outputs: {{{outputs}}})"#);
+    let graph = compile(&text, &[("v", EdgeType::volume(size, 1))]).unwrap_or_else(|e| panic!("{e}"));
+    let values = Bench::new().gpu(&graph, &|_| Tensor::Volume(block.clone())).unwrap();
+    let check = |name: &str, size: [usize; 2], points: &[[usize; 3]], expected: &[f64]| {
+        for ([x, y, z], expected) in points.iter().zip(expected) {
+            let got = values[name][(z * size[1] + y) * size[0] + x];
+            assert!((got - expected).abs() < 1e-6, "{name} at {x}, {y}, {z}: {got}, not {expected}");
+        }
+    };
+    let points = [[0, 0, 0], [3, 2, 1], [6, 4, 3], [5, 0, 2]];
+    check("blur", [7, 5], &points, &[0.2790582, 0.4475671, 0.458806, 0.4424081]);
+    check("wrap", [7, 5], &points, &[0.4297193, 0.449155, 0.4692885, 0.4416446]);
+    check("zoom", [14, 10], &[[0, 0, 0], [7, 4, 3], [13, 9, 7], [6, 1, 5]], &[0.0, 0.4303977, 0.3636364, 0.3892045]);
+    check("shrink", [7, 5], &[[0, 0, 0], [3, 2, 1], [6, 4, 0]], &[0.2727273, 0.3636364, 0.3522727]);
+    let at = 4 * ((5 + 2) * 7 + 3);
+    for (got, expected) in values["gradient"][at..at + 3].iter().zip([1.9090909, -0.2272727, -1.4545455]) {
+        assert!((got - expected).abs() < 1e-5, "gradient: {got}, not {expected}");
+    }
+}
+
+/// Buffers that a shader binds have a largest size: volumes cross the rim in bands of slices.
+#[test]
+fn volumes_cross_the_rim_in_bands() {
+    let graph = r#"Graph(version: 1, inputs: {"volume": Volume}, nodes: {}, outputs: {"out": "volume"})"#;
+    let graph = compile(graph, &[("volume", edge_type("volume", [1, 1]))]).unwrap();
+    let mut bench = Bench::new();
+    let input = |name: &str| edge(name, [1, 1]);
+    for max_binding_bytes in [7_000, 13_000, 1 << 20] {
+        let limits = Limits { max_binding_bytes, ..bench.limits() };
+        let plan = pipe_tests::bench::plan(&graph, &limits, &pipe_plan::Options::default()).unwrap();
+        let got = bench.run(&graph, plan, &input).unwrap();
+        let Tensor::Volume(block) = input("volume") else { panic!("it is a volume") };
+        let expected: Vec<f64> = block.voxels.iter().map(|v| v[0]).collect();
+        assert_eq!(got["out"], expected, "in bindings of {max_binding_bytes} bytes");
+    }
+}
+
+/// Proportions of scans: the spacing in a file's header is known to expressions.
+#[test]
+fn expressions_know_the_spacing_of_voxels() {
+    use pipe_io::volume::{Volume, Voxel, write};
+    let folder = tempfile::tempdir().unwrap();
+    let file = |name: &str| folder.path().join(name).display().to_string();
+    let nodes = r#""v": VolumeSlice(volume: "in"), "c": Constant(color: ("=in.dx", "=in.dy", "=in.dz*in.depth", 1), size: (1, 1))"#;
+    let text = format!(r#"Graph(version: 1, inputs: {{"in": Volume}}, nodes: {{{nodes}}}, outputs: {{"out": "c", "slice": "v"}})"#);
+    std::fs::write(folder.path().join("spacing.ron"), text).unwrap();
+    let volume = Volume::of_floats([2, 3, 4], 1, [0.5, 0.75, 2.0], &[0.0; 24], Voxel::F32);
+    write(&folder.path().join("in.nrrd"), &volume).unwrap();
+    let mut session = Session::open(&pipe_gpu::Choice::parse(&std::env::var("PIPE_DEVICE").unwrap_or_default()), None).unwrap();
+    let mut job = Job::new(&file("spacing.ron"));
+    job.bind_input("in", &file("in.nrrd"));
+    job.bind_output("out", &file("out.exr")).unwrap();
+    session.run(&job).unwrap_or_else(|e| panic!("{e}"));
+    let out = pipe_io::read(&pipe_io::Source::parse(&file("out.exr")), &pipe_io::ReadOptions::default()).unwrap();
+    assert_eq!([0, 1, 2].map(|c| out.sample_at(0, 0, c).unwrap()), [0.5, 0.75, 8.0]);
 }
 
 /// NRRD in, NPY out: voxels as they were, whatever their type.
@@ -311,6 +403,8 @@ fn volumes_go_through_a_graph_unchanged() {
     let folder = tempfile::tempdir().unwrap();
     let graph = folder.path().join("copy.ron");
     std::fs::write(&graph, r#"Graph(version: 1, inputs: {"in": Volume}, nodes: {}, outputs: {"out": "in"})"#).unwrap();
+    let read_graph = folder.path().join("read.ron");
+    std::fs::write(&read_graph, graph_text(r#""v": ReadVolume(path: "in.npy")"#, r#""out": "v""#)).unwrap();
     let mut session = Session::open(&pipe_gpu::Choice::parse(&std::env::var("PIPE_DEVICE").unwrap_or_default()), None).unwrap();
     let file = |name: &str| folder.path().join(name).display().to_string();
     let open = |name: &str| read(&pipe_io::Source::parse(&file(name)), &pipe_io::Limits::default()).unwrap();
@@ -332,6 +426,11 @@ fn volumes_go_through_a_graph_unchanged() {
             assert_eq!((got.header.size, got.header.channels), ([7, 5, 3], channels));
             let off = given.values().iter().zip(got.values()).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
             assert!(off <= 1e-7, "{voxel:?} of {channels} channels is off by {off}");
+            // A node that reads the file finds it beside the graph.
+            let mut job = Job::new(&read_graph.display().to_string());
+            job.bind_output("out", &file("again.npy")).unwrap();
+            session.run(&job).unwrap_or_else(|e| panic!("{e}"));
+            assert_eq!(open("again.npy"), got);
         }
     }
 }

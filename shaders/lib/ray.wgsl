@@ -23,3 +23,8 @@ fn cube_span(ray: Ray) -> vec2f {
     let leave = max(low, high);
     return vec2f(max(max(enter.x, enter.y), max(enter.z, 0.0)), min(leave.x, min(leave.y, leave.z)));
 }
+
+/// Where a point of the unit cube is seen when the volume has other proportions than a cube's.
+fn seen_at(p: vec3f, proportions: vec3f) -> vec3f {
+    return (p - 0.5) * proportions + 0.5;
+}

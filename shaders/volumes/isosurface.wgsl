@@ -1,6 +1,6 @@
 // HALVINGS: of the last step in search of the surface; 0 takes the sample behind it.
 
-import package::lib::ray::{cube_span, eye_ray};
+import package::lib::ray::{cube_span, eye_ray, seen_at};
 
 struct Hit {
     found: bool,
@@ -60,8 +60,8 @@ fn each(xy: vec2i) {
         return;
     }
     let p = ray.origin + hit.depth * ray.direction;
-    let n = facing(gradient(p));
-    store_out(xy, vec4f(vec3f(0.5 + 0.5 * dot(n, normalize(params.light - p))), 1.0));
-    store_depth(xy, vec4f(hit.depth));
+    let n = normal_at(p);
+    store_out(xy, vec4f(vec3f(lit(p, n)), 1.0));
+    store_depth(xy, vec4f(hit.depth * length(ray.direction * params.proportions)));
     store_normal(xy, vec4f(n, 1.0));
 }

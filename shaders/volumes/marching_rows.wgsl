@@ -29,13 +29,15 @@ fn owned(here: u32, next: u32) -> vec4u {
     return (along_x & vec4u(1u)) | ((along_y & vec4u(1u)) << vec4u(1u)) | ((along_z & vec4u(1u)) << vec4u(2u));
 }
 
+/// Bits 0 to 3 at places 0, 2, 4 and 6.
+fn spread(bits: u32) -> u32 {
+    let pairs = ((bits & 0xfu) | (bits << 2u)) & 0x33u;
+    return (pairs | (pairs << 1u)) & 0x55u;
+}
+
 /// Where the case of the cell between two points begins in the table: bit x + 2·row of the case is a corner.
 fn case_at(here: u32, next: u32) -> i32 {
-    var case_bits = 0u;
-    for (var row = 0u; row < 4u; row++) {
-        case_bits |= (((here >> row) & 1u) | (((next >> row) & 1u) << 1u)) << (2u * row);
-    }
-    return i32(case_bits) * STRIDE;
+    return i32(spread(here) | (spread(next) << 1u)) * STRIDE;
 }
 
 /// Whether a row has cells.

@@ -16,6 +16,5 @@ fn transfer(p: vec3f) -> vec4f {
     if alpha <= TRANSPARENT {
         return vec4f();
     }
-    let lit = 0.5 + 0.5 * dot(facing(gradient(p)), normalize(params.light - p));
-    return vec4f(lit * vec3f(d, d * d, d * d * d) + 0.1, alpha);
+    return vec4f(lit(p, normal_at(p)) * vec3f(d, d * d, d * d * d) + 0.1, alpha);
 }

@@ -90,11 +90,29 @@ fn type_of(property: &Value, root: &Value) -> String {
                     None => format!("{name}({})", type_of(inner, root)),
                 }
             }
+            None if property.get("properties").is_some() => "struct".to_owned(),
             None => "map".to_owned(),
         },
         "string" => "text".to_owned(),
         other => other.to_owned(),
     }
+}
+
+/// A property that is a struct of several fields, such as a camera.
+fn parts<'a>(property: &Value, root: &'a Value) -> Option<&'a serde_json::Map<String, Value>> {
+    let name = property.get("$ref").and_then(Value::as_str)?.rsplit('/').next()?;
+    root["$defs"][name]["properties"].as_object()
+}
+
+/// The fields of a node with their schemas; those of a struct follow it, as `camera.eye`.
+fn fields(schema: &Value) -> Vec<(String, &Value)> {
+    let mut all = Vec::new();
+    for (name, property) in schema["properties"].as_object().into_iter().flatten() {
+        all.push((name.clone(), property));
+        let inner = parts(property, schema).into_iter().flatten();
+        all.extend(inner.map(|(part, property)| (format!("{name}.{part}"), property)));
+    }
+    all
 }
 
 fn range(property: &Value) -> String {
@@ -116,6 +134,12 @@ fn default(property: &Value) -> String {
             Some(v) if n.is_f64() => format!("{}", v as f32),
             _ => n.to_string(),
         },
+        // The defaults of a struct stand at its fields.
+        Some(Value::Object(_)) => String::new(),
+        Some(Value::Array(list)) => {
+            let entries: Vec<String> = list.iter().map(|v| default(&json!({"default": v}))).collect();
+            format!("({})", entries.join(", "))
+        }
         Some(other) => other.to_string(),
     }
 }
@@ -127,7 +151,7 @@ pub fn entry(kind: &Kind) -> String {
     if let Some(text) = schema["description"].as_str() {
         let _ = writeln!(out, "{text}\n");
     }
-    for (name, property) in schema["properties"].as_object().into_iter().flatten() {
+    for (name, property) in fields(&schema) {
         let unit = property.get("x-unit").and_then(Value::as_str).unwrap_or_default();
         let mut facts = vec![type_of(property, &schema)];
         let (r, d) = (range(property), default(property));
@@ -174,7 +198,7 @@ pub fn page(registry: &Registry) -> String {
             let schema = json!((kind.schema)());
             let _ = writeln!(out, "\n### {}\n\n{}\n", kind.name, schema["description"].as_str().unwrap_or_default());
             out.push_str("| field | type | default | range | meaning |\n|---|---|---|---|---|\n");
-            for (name, property) in schema["properties"].as_object().into_iter().flatten() {
+            for (name, property) in fields(&schema) {
                 let cell = |text: String| text.replace('|', "\\|").replace('\n', " ");
                 let unit = property.get("x-unit").and_then(Value::as_str).unwrap_or_default();
                 let _ = writeln!(

@@ -11,7 +11,7 @@ use pipe_io::volume::{Volume, Voxel};
 
 use crate::{Failure, plot};
 
-pub(crate) fn floats(bytes: &[u8]) -> Vec<f32> {
+fn floats(bytes: &[u8]) -> Vec<f32> {
     bytes.chunks_exact(4).map(|w| f32::from_le_bytes([w[0], w[1], w[2], w[3]])).collect()
 }
 

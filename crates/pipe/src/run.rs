@@ -355,7 +355,7 @@ impl Session {
                     images.push((target, form.picture(size[0], size[1], bytes, metadata)));
                 }
                 Packed::Volume { path, ty, spacing, voxel } => {
-                    volumes.push((path, Volume::of_floats(ty.size, ty.channels, spacing, &readback::floats(&bytes), voxel)));
+                    volumes.push((path, Volume::of_bytes(ty.size, ty.channels, spacing, bytes, voxel)));
                 }
                 Packed::Mesh(_) => unreachable!("taken above"),
                 Packed::Data(file) => data.push((file, bytes)),
@@ -390,8 +390,13 @@ pub fn input_kinds(project: &mut Project) -> HashMap<String, EdgeKind> {
 
 /// What the resolver must know of a job.
 pub fn request(job: &Job, inputs: &Inputs) -> Request {
+    let spacing = |(name, value): (&String, &Decoded)| match value {
+        Decoded::Volume(volume) => Some((name.clone(), volume.header.spacing)),
+        _ => None,
+    };
     Request {
         inputs: inputs.iter().map(|(name, value)| (name.clone(), value.ty())).collect(),
+        spacings: inputs.iter().filter_map(spacing).collect(),
         assumed: None,
         settings: job.settings.clone(),
         frame: job.frame,
@@ -471,7 +476,7 @@ fn rim(job: &Job, graph: &Graph, inputs: &Inputs, files: &Inputs) -> Result<(Rim
         let ty = graph.ty(value);
         let to = match ty {
             EdgeType::Image(t) => {
-                let target = Target::parse(&file)?;
+                let target = fits(Target::parse(&file), &name, &ty)?;
                 let alpha = first.is_some_and(|m| m.had_alpha) || sets_alpha(graph);
                 let channels = match (t.channels, alpha) {
                     (1, _) => Channels::Y,
@@ -486,18 +491,28 @@ fn rim(job: &Job, graph: &Graph, inputs: &Inputs, files: &Inputs) -> Result<(Rim
             EdgeType::Table(_) | EdgeType::Scalar(_) => Packed::Data(ReadbackFile { path: file, element: None, channels: Vec::new(), ty }),
             EdgeType::Volume(ty) => {
                 let path = PathBuf::from(&file);
-                let voxel = pipe_io::volume::voxel_written(&path, job.write.pixel_type)?;
+                let voxel = fits(pipe_io::volume::voxel_written(&path, job.write.pixel_type), &name, &EdgeType::Volume(ty))?;
                 Packed::Volume { path, ty, spacing: spacing(ty.size, first_volume), voxel }
             }
             EdgeType::Mesh(_) => {
                 let path = PathBuf::from(&file);
-                pipe_io::mesh::MeshFormat::of(&path)?;
+                fits(pipe_io::mesh::MeshFormat::of(&path), &name, &ty)?;
                 Packed::Mesh(path)
             }
         };
         outputs.push(Output { name, to, metadata: first.cloned() });
     }
     Ok((rim, outputs))
+}
+
+/// What a file name means for an output of this type; tells what would fit when it means nothing.
+fn fits<T>(meaning: pipe_io::Result<T>, output: &str, ty: &EdgeType) -> Result<T, Failure> {
+    meaning.map_err(|e| match e {
+        pipe_io::Error::UnknownExtension { file, known } => {
+            Failure::Graph(format!("output `{output}` is {ty}, which `{file}` cannot hold\n  next: end the file's name in one of {known}"))
+        }
+        other => other.into(),
+    })
 }
 
 /// The distance between voxels of an output that extends as far as the input: resampling does not change the extent.

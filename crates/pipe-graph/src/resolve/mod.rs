@@ -39,6 +39,9 @@ const MOST_NODES: usize = 100_000;
 pub struct Request {
     /// Types of graph inputs, from the headers of the files bound to them.
     pub inputs: IndexMap<String, EdgeType>,
+    /// Distances between the voxels of volume inputs along x, y and z, as `NAME.dx`, `NAME.dy` and `NAME.dz` in expressions; 1
+    /// when absent.
+    pub spacings: IndexMap<String, [f32; 3]>,
     /// Size that is assumed for inputs that nothing is bound to (`plan --size`), 1920×1080 when absent.
     pub assumed: Option<[u32; 2]>,
     /// `--set NAME=VALUE`: a parameter of the graph, or `node.field`.
@@ -116,6 +119,13 @@ fn field_of<'t>(tree: &'t Tree, name: &str) -> Option<&'t Field> {
     }
 }
 
+/// Adds `NAME.dx`, `NAME.dy` and `NAME.dz`.
+fn spacing_names(env: &mut Env, name: &str, spacing: [f32; 3]) {
+    for (field, distance) in ["dx", "dy", "dz"].into_iter().zip(spacing) {
+        env.set(&format!("{name}.{field}"), f64::from(distance));
+    }
+}
+
 /// A graph under construction.
 #[derive(Default)]
 struct Level {
@@ -158,6 +168,9 @@ impl Resolver<'_> {
                 ));
             }
             self.size_names(&mut env, &input.name.value, ty);
+            if let Some(spacing) = self.request.spacings.get(&input.name.value) {
+                spacing_names(&mut env, &input.name.value, *spacing);
+            }
             let node = self.level().dag.add_node(Instance {
                 name: input.name.value.clone(),
                 kind: "Input",
@@ -234,7 +247,7 @@ impl Resolver<'_> {
         }
     }
 
-    /// Adds `NAME.width`, `NAME.height` (and `NAME.depth`, `NAME.channels`).
+    /// Adds `NAME.width`, `NAME.height` (and `NAME.depth`, `NAME.channels`, and a spacing of 1).
     fn size_names(&self, env: &mut Env, name: &str, ty: EdgeType) {
         let mut set = |field: &str, v: u32| env.set(&format!("{name}.{field}"), f64::from(v));
         match ty {
@@ -248,6 +261,7 @@ impl Resolver<'_> {
                 set("height", t.size[1]);
                 set("depth", t.size[2]);
                 set("channels", t.channels.into());
+                spacing_names(env, name, [1.0; 3]);
             }
             EdgeType::Table(t) => set("len", t.len),
             EdgeType::Scalar(_) | EdgeType::Mesh(_) => {}

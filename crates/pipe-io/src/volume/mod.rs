@@ -206,6 +206,16 @@ impl Volume {
         Self { header, bytes }
     }
 
+    /// The same from the native bytes of the floats, which are kept when floats are wanted.
+    pub fn of_bytes(size: [u32; 3], channels: u8, spacing: [f32; 3], bytes: Vec<u8>, voxel: Voxel) -> Self {
+        if voxel != Voxel::F32 {
+            let floats: Vec<f32> = bytemuck::pod_collect_to_vec(&bytes);
+            return Self::of_floats(size, channels, spacing, &floats, voxel);
+        }
+        let header = VolumeHeader { spacing, ..VolumeHeader::new(VolumeFormat::Raw, size, channels, Stored::As(voxel)) };
+        Self { header, bytes }
+    }
+
     /// Every value, converted as the GPU converts it.
     pub fn values(&self) -> Vec<f32> {
         fn each<const N: usize>(bytes: &[u8], f: impl Fn([u8; N]) -> f32) -> Vec<f32> {
@@ -296,7 +306,7 @@ fn open(source: &Source, bytes: &[u8], limits: &Limits) -> Result<(VolumeFormat,
     let format = VolumeFormat::sniff(bytes).ok_or_else(|| Error::UnknownFormat {
         file: source.to_string(),
         what: "volume",
-        known: format!("{}; raw voxels are read as file.raw#WxHxD:TYPE", VolumeFormat::ALL.map(VolumeFormat::name).join(", ")),
+        known: "NRRD, NIfTI, NPY (raw voxels are read as file.raw#WxHxD:TYPE)".to_owned(),
     })?;
     let opened = shielded(|| match (format, part) {
         (VolumeFormat::Nifti, _) => nifti::open(bytes, part, limits),

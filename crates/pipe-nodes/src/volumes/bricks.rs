@@ -11,8 +11,8 @@ use crate::shader;
 const EDGE: u32 = 8;
 
 /// The greatest (or least) density that interpolation can make in each brick: a volume for the port `bricks`.
-pub(super) fn extremes(cx: &mut Lowering<'_>, volume: ResourceId, greatest: bool) -> ResourceId {
-    let (Shape::Volume(ty), border) = (cx.shape(volume), cx.border()) else { unreachable!("the resolver bound a volume") };
+pub(super) fn extremes(cx: &mut Lowering<'_>, volume: ResourceId, border: Border, greatest: bool) -> ResourceId {
+    let Shape::Volume(ty) = cx.shape(volume) else { unreachable!("the resolver bound a volume") };
     // Cells lie between voxel centres, so there is one more than voxels.
     let size = ty.size.map(|n| (n + 1).div_ceil(EDGE));
     let bricks = cx.intermediate("bricks", Shape::Volume(VolumeType { size, channels: 1, precision: Precision::F32 }));

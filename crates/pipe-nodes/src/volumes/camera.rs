@@ -1,7 +1,9 @@
 //! The pin-hole camera that every node looking into a volume has as its field `camera`.
 //!
 //! A node calls [`Camera::image`] in `outputs`, hands its pass to [`Camera::describe`], and calls `eye_ray` of
-//! `shaders/lib/ray.wgsl` with the four parameters that this adds; its twin asks [`Camera::view`] for the same rays.
+//! `shaders/lib/ray.wgsl` with the parameters that this adds; its twin asks [`Camera::view`] for the same rays. Rays live in
+//! the unit cube, whatever the proportions of the volume; what is long or perpendicular to the eye is another matter there,
+//! and [`View::stretch`] and [`View::seen_at`] (`params.proportions` in shaders) lead back.
 
 use glam::{DMat4, DVec3, Mat4};
 use pipe_graph::lowering::PassBuilder;
@@ -33,7 +35,7 @@ pub(crate) struct Camera {
     /// to the right, up and backward, and the place of the eye.
     matrix: Option<[f32; 16]>,
     /// Lengths of the volume's edges, in any unit: it is seen as a box of these proportions, its longest edge 1, in the middle
-    /// of the cube. Distances and normals stay those of the unit cube.
+    /// of the cube.
     #[default([1.0, 1.0, 1.0])]
     extent: [f32; 3],
 }
@@ -84,6 +86,8 @@ pub(crate) struct View {
     up: DVec3,
     /// From the eye to the middle of the picture.
     forward: DVec3,
+    /// Edges of the box that the volume is seen as.
+    proportions: DVec3,
 }
 
 impl View {
@@ -92,6 +96,21 @@ impl View {
         let at = |i: i64, n: u32| (i as f64 + 0.5) * 2.0 / f64::from(n) - 1.0;
         let direction = self.forward + at(x, self.size[0]) * self.right - at(y, self.size[1]) * self.up;
         Ray { origin: self.eye, direction: direction.normalize() }
+    }
+
+    /// The length that is seen of a unit of distance along a direction in the cube.
+    pub(crate) fn stretch(&self, direction: DVec3) -> f64 {
+        (direction * self.proportions).length()
+    }
+
+    /// Where a point of the cube is seen.
+    pub(crate) fn seen_at(&self, p: DVec3) -> DVec3 {
+        (p - 0.5) * self.proportions + 0.5
+    }
+
+    /// The gradient that is seen, from one in the cube.
+    pub(crate) fn seen_gradient(&self, gradient: DVec3) -> DVec3 {
+        gradient / self.proportions
     }
 
     /// The picture whose every pixel is computed from its ray.
@@ -154,13 +173,14 @@ impl Camera {
             right: space.x_axis.truncate() * reach * aspect / proportions,
             up: space.y_axis.truncate() * reach / proportions,
             forward: -space.z_axis.truncate() / proportions,
+            proportions,
         }
     }
 
-    /// Tells a pass the rays: `params.eye`, `.right`, `.up` and `.forward`, the arguments of `eye_ray`.
+    /// Tells a pass the rays: `params.eye`, `.right`, `.up` and `.forward`, the arguments of `eye_ray`, and `.proportions`.
     pub(crate) fn describe<'b, 'a>(&self, pass: PassBuilder<'b, 'a>) -> PassBuilder<'b, 'a> {
-        let View { eye, right, up, forward, .. } = self.view();
-        [("eye", eye), ("right", right), ("up", up), ("forward", forward)]
+        let View { eye, right, up, forward, proportions, .. } = self.view();
+        [("eye", eye), ("right", right), ("up", up), ("forward", forward), ("proportions", proportions)]
             .into_iter()
             .fold(pass, |pass, (name, v)| pass.param(name, v.as_vec3().to_array()))
     }

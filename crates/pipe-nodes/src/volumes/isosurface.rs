@@ -1,16 +1,16 @@
 //! `Isosurface`: the surface where a volume reaches a density.
 
-use glam::DVec3;
 use pipe_graph::prelude::*;
 use smart_default::SmartDefault;
 
 use super::bricks::{extremes, with_bricks};
 use super::camera::{Camera, Ray};
-use super::gradient::{facing, gradient, with_gradient};
+use super::gradient::{lit, with_shading};
 use crate::shader;
 
-/// The first point of every eye ray where the density reaches `iso`, lit by a point light: 0.5 + 0.5·n·l, n facing from high
-/// to low density by central differences over two voxels, l towards the light. Transparent where there is none.
+/// The surface where a volume reaches a density, lit by a point light. It is the first point of every eye ray where the density
+/// is `iso` or more; its brightness is 0.5 + 0.5·n·l, n facing from high to low density by central differences over two
+/// voxels, l towards the light. Transparent where there is none.
 ///
 /// A density that is reached on a face of the unit cube shows that face: with `options: (border: Black)` normals there
 /// point outwards, otherwise they follow the density inside. The first channel is the density.
@@ -28,7 +28,7 @@ pub(super) struct Isosurface {
     #[default = 256]
     #[schemars(range(min = 1, max = 4096))]
     steps: u32,
-    /// Place of the light; the volume fills the unit cube.
+    /// Place of the light, in the space of the camera.
     #[default([0.3, -2.0, 0.0])]
     light: [f32; 3],
     /// Whether the surface is searched between two samples, or is at the second one.
@@ -42,6 +42,7 @@ pub(super) const KIND: Kind = Kind::of::<Isosurface>(
     &[
         r#"Isosurface(volume: "volume", camera: (size: (33, 25)))"#,
         r#"Isosurface(volume: "volume", iso: "scalar", camera: (eye: (2, 1.5, -1), size: (24, 24)), light: (3, 3, -3))"#,
+        r#"Isosurface(volume: "volume", camera: (eye: (1.9, 0.9, 1.6), size: (25, 27), extent: (3, 1.5, 2)))"#,
         r#"Isosurface(volume: "fog", iso: 0.9, camera: (eye: (0.4, -1.2, 0.3), up: (0, 0, 1), size: (19, 23)), steps: 64, refine: false)"#,
     ],
 )
@@ -87,8 +88,8 @@ impl Node for Isosurface {
     fn lower(&self, cx: &mut Lowering<'_>) -> Result<(), Mistake> {
         let (volume, border) = (cx.input(&self.volume), cx.border());
         let [out, depth, normal] = ["out", "depth", "normal"].map(|port| cx.output(port));
-        let bricks = extremes(cx, volume, true);
-        let pass = cx.pass("", with_bricks(&with_gradient(&shader!("volumes/isosurface")))).entry(Entry::Each);
+        let bricks = extremes(cx, volume, border, true);
+        let pass = cx.pass("", with_bricks(&with_shading(&shader!("volumes/isosurface")))).entry(Entry::Each);
         self.camera
             .describe(pass)
             .read_with("volume", volume, Reach::Whole, border, Filter::Linear)
@@ -106,12 +107,10 @@ impl Node for Isosurface {
 
     fn reference(&self, cx: &Reference<'_>) -> Vec<Tensor> {
         let (volume, iso, view) = (cx.volume(&self.volume), cx.driven(&self.iso), self.camera.view());
-        let light = DVec3::from(self.light.map(f64::from));
         let surface = |ray: &Ray| {
             let hit = self.hit(ray, |t| volume.sample(ray.at(t).to_array(), cx.border)[0], iso)?;
-            let p = ray.at(hit);
-            let n = facing(gradient(volume, p, cx.border));
-            Some((hit, n, 0.5 + 0.5 * n.dot((light - p).normalize())))
+            let (n, shade) = lit(volume, ray.at(hit), cx.border, &view, self.light);
+            Some((hit * view.stretch(ray.direction), n, shade))
         };
         let (mut depth, mut normal) = (Vec::new(), Vec::new());
         let out = view.picture(4, |ray| {

@@ -3,10 +3,11 @@
 use pipe_graph::prelude::*;
 use smart_default::SmartDefault;
 
+use super::bricks::{extremes, with_bricks};
 use super::camera::Camera;
 use crate::shader;
 
-/// Maximum intensity projection: each pixel is the greatest value, channel by channel, that its eye ray meets in the
+/// Maximum intensity projection. Each pixel is the greatest value, channel by channel, that its eye ray meets in the
 /// volume, interpolated trilinearly; 0 where it misses the unit cube.
 #[derive(Debug, SmartDefault, Serialize, Deserialize, JsonSchema)]
 #[serde(default)]
@@ -39,11 +40,15 @@ impl Node for MaximumIntensity {
 
     fn lower(&self, cx: &mut Lowering<'_>) -> Result<(), Mistake> {
         let (volume, out) = (cx.input(&self.volume), cx.output("out"));
-        let pass = cx.pass("", shader!("volumes/maximum_intensity"));
+        let Shape::Volume(ty) = cx.shape(volume) else { unreachable!("the resolver bound a volume") };
+        let bricks = extremes(cx, volume, Border::Clamp, true);
+        let pass = cx.pass("", with_bricks(&shader!("volumes/maximum_intensity")));
         self.camera
             .describe(pass)
             .read_with("volume", volume, Reach::Whole, Border::Clamp, Filter::Linear)
+            .read_with("bricks", bricks, Reach::Whole, Border::Clamp, Filter::Nearest)
             .write("out", out)
+            .constant("GREY", ty.channels == 1)
             .param("steps", self.steps as i32)
             .add();
         Ok(())

@@ -7,8 +7,8 @@ use smart_default::SmartDefault;
 use super::resolution::{Resolution, centre};
 use crate::shader;
 
-/// Gradient noise (K. Perlin, Improving Noise, 2002) in 0..1, one channel; the same on every device and in every run for
-/// the same seed.
+/// Gradient noise in 0..1, one channel; the same on every device and in every run for the same seed. See K. Perlin,
+/// Improving Noise, 2002.
 ///
 /// Octaves double the frequency and halve the weight; their sum is divided by the sum of weights.
 #[derive(Debug, SmartDefault, Serialize, Deserialize, JsonSchema)]

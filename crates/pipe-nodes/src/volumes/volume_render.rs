@@ -5,11 +5,12 @@ use pipe_graph::prelude::*;
 use smart_default::SmartDefault;
 
 use super::bricks::{extremes, with_bricks};
-use super::camera::{Camera, Ray};
-use super::gradient::{facing, gradient, with_gradient};
+use super::camera::{Camera, Ray, View};
+use super::gradient::{lit, with_shading};
 use crate::shader;
 
-/// Composites samples of a volume along every eye ray (R. Drebin, L. Carpenter, P. Hanrahan, Volume Rendering, 1988).
+/// A volume as a coloured, translucent body: samples along every eye ray are composited. See R. Drebin, L. Carpenter and
+/// P. Hanrahan, Volume Rendering, 1988.
 ///
 /// A sample of density d has the opacity α = clamp(e·(d − c) + 0.5, 0, 1) and, with `transfer: Lecture`, the colour
 /// (0.5 + 0.5·n·l)·(d, d², d³) + 0.1, n facing from high to low density by central differences over two voxels, l towards
@@ -38,7 +39,7 @@ pub(super) struct VolumeRender {
     /// them it is interpolated, and its colours are not lit.
     #[default(EdgeOr::Value(Transfer::Lecture))]
     transfer: EdgeOr<Table, Transfer>,
-    /// Place of the light; the volume fills the unit cube.
+    /// Place of the light, in the space of the camera.
     #[default([0.3, -2.0, 0.0])]
     light: [f32; 3],
 }
@@ -68,6 +69,7 @@ pub(super) const KIND: Kind = Kind::of::<VolumeRender>(
         r#"VolumeRender(volume: "volume", alpha_exponent: 0.3, alpha_center: 2, camera: (eye: (2, 1.5, -1), size: (24, 24)), steps: 100)"#,
         r#"VolumeRender(volume: "fog", order: BackToFront, alpha_exponent: 0.2, alpha_center: 2.5, camera: (eye: (0.4, -1.2, 0.3), up: (0, 0, 1), size: (19, 23)))"#,
         r#"VolumeRender(volume: "volume", transfer: Lecture, order: BackToFront, light: (2, 2, 2), camera: (eye: (0.5, 0.6, 0.4), size: (19, 23)), steps: 33)"#,
+        r#"VolumeRender(volume: "volume", alpha_exponent: 0.3, alpha_center: 2, camera: (eye: (1.9, 0.9, 1.6), size: (25, 27), extent: (3, 1.5, 2)))"#,
         r#"VolumeRender(volume: "volume", transfer: "curve", camera: (eye: (2, 1.5, -1), size: (24, 24)))"#,
     ],
 )
@@ -83,23 +85,22 @@ impl VolumeRender {
     }
 
     /// Colour and opacity of a reference step, by the formula.
-    fn lecture(&self, volume: &Block, p: DVec3, border: Border) -> (DVec3, f64) {
+    fn lecture(&self, volume: &Block, p: DVec3, border: Border, view: &View) -> (DVec3, f64) {
         let d = volume.sample(p.to_array(), border)[0];
         let alpha = (f64::from(self.alpha_exponent) * (d - f64::from(self.alpha_center)) + 0.5).clamp(0.0, 1.0);
-        let light = (DVec3::from(self.light.map(f64::from)) - p).normalize();
-        let lit = 0.5 + 0.5 * facing(gradient(volume, p, border)).dot(light);
+        let (_, lit) = lit(volume, p, border, view, self.light);
         (lit * DVec3::new(d, d * d, d * d * d) + 0.1, alpha)
     }
 
     /// The picture's pixel, back to front, which needs no early end.
-    fn composite(&self, ray: &Ray, sample: impl Fn(DVec3) -> (DVec3, f64)) -> [f64; 4] {
+    fn composite(&self, ray: &Ray, stretch: f64, sample: impl Fn(DVec3) -> (DVec3, f64)) -> [f64; 4] {
         let Some([enter, leave]) = ray.cube_span() else { return [0.0; 4] };
-        let (mut colour, mut opacity, step) = (DVec3::ZERO, 0.0, self.step());
+        let (mut colour, mut opacity, step) = (DVec3::ZERO, 0.0, self.step() / stretch);
         for i in (0..((leave - enter) / step).ceil() as u32).rev() {
             let near = enter + f64::from(i) * step;
             let length = step.min(leave - near);
             let (c, alpha) = sample(ray.at(near + length / 2.0));
-            let alpha = 1.0 - (1.0 - alpha).powf(length / REFERENCE_STEP);
+            let alpha = 1.0 - (1.0 - alpha).powf(length * stretch / REFERENCE_STEP);
             colour = alpha * c + (1.0 - alpha) * colour;
             opacity = alpha + (1.0 - alpha) * opacity;
         }
@@ -140,9 +141,9 @@ impl Node for VolumeRender {
         };
         let (shader, transfer) = match table {
             Some(_) => (shader!("volumes/volume_render"), shader!("volumes/transfer_table")),
-            None => (with_bricks(&with_gradient(&shader!("volumes/volume_render"))), shader!("volumes/transfer_lecture")),
+            None => (with_bricks(&with_shading(&shader!("volumes/volume_render"))), shader!("volumes/transfer_lecture")),
         };
-        let bricks = table.is_none().then(|| extremes(cx, volume, self.alpha_exponent >= 0.0));
+        let bricks = table.is_none().then(|| extremes(cx, volume, border, self.alpha_exponent >= 0.0));
         let pass = cx.pass("", Shader::builtin(&shader.path, &format!("{}\n{}", shader.source, transfer.source)));
         let mut pass = self
             .camera
@@ -165,11 +166,11 @@ impl Node for VolumeRender {
     }
 
     fn reference(&self, cx: &Reference<'_>) -> Vec<Tensor> {
-        let volume = cx.volume(&self.volume);
+        let (volume, view) = (cx.volume(&self.volume), self.camera.view());
         let sample = |p: DVec3| match &self.transfer {
             EdgeOr::Edge(table) => look_up(cx.table(table), volume.sample(p.to_array(), cx.border)[0]),
-            EdgeOr::Value(Transfer::Lecture) => self.lecture(volume, p, cx.border),
+            EdgeOr::Value(Transfer::Lecture) => self.lecture(volume, p, cx.border, &view),
         };
-        vec![Tensor::Image(self.camera.view().picture(4, |ray| self.composite(&ray, sample)))]
+        vec![Tensor::Image(view.picture(4, |ray| self.composite(&ray, view.stretch(ray.direction), sample)))]
     }
 }

@@ -7,8 +7,8 @@ use smart_default::SmartDefault;
 use super::resolution::{Resolution, centre};
 use crate::shader;
 
-/// A sphere, a torus or a box in the middle of the unit cube, of density clamp(0.5 − distance / softness, 0, 1), where
-/// the distance is negative inside: the density is 0.5 on the surface. One channel.
+/// A sphere, a torus or a box with a soft surface, in the middle of the unit cube. Its density is
+/// clamp(0.5 − distance / softness, 0, 1), where the distance is negative inside: 0.5 on the surface. One channel.
 #[derive(Debug, SmartDefault, Serialize, Deserialize, JsonSchema)]
 #[serde(default)]
 pub(super) struct VolumeShape {

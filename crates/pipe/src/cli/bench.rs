@@ -4,11 +4,12 @@ use std::fmt::Write as _;
 
 use indexmap::IndexMap;
 use pipe::Failure;
-use pipe::project::Project;
-use pipe::run::{Decoded, Inputs, Job, Report, Session, input_kinds};
+use pipe::project::{Project, World};
+use pipe::run::{Decoded, Inputs, Job, Report, Session, input_kinds, request};
 use pipe_graph::types::EdgeKind;
+use pipe_io::volume::{Volume, Voxel};
 use pipe_io::{Alpha, Channels, Colour, Layout, Metadata, Picture, Primaries, Sample, Transfer};
-use pipe_plan::plan::{Run, Step, Times};
+use pipe_plan::plan::{Run, Step};
 use serde_json::{Value, json};
 
 use super::args::{self, BenchArgs};
@@ -40,16 +41,24 @@ fn one(session: &mut Session, a: &BenchArgs, size: [u32; 2]) -> Result<Value, Fa
     job.fuse = !a.device.no_fuse;
     job.budget = a.device.vram.as_deref().map(args::bytes).transpose()?;
     job.profile = true;
-    for (name, _) in &document.outputs {
-        // Bound, so that it is computed and packed; never written.
-        job.bind_output(&name.value, "bench.png")?;
-    }
     let mut inputs = Inputs::new();
     for input in &document.inputs {
-        if kinds.get(&input.name.value) != Some(&EdgeKind::Image) {
-            return Err(Failure::Graph(format!("bench makes images only; input `{}` is none", input.name.value)));
-        }
-        inputs.insert(input.name.value.clone(), Decoded::Picture(test_picture(size)));
+        let made = match kinds.get(&input.name.value) {
+            Some(EdgeKind::Image) => Decoded::Picture(test_picture(size)),
+            Some(EdgeKind::Volume) => Decoded::Volume(test_volume(size)),
+            _ => return Err(Failure::Graph(format!("bench makes images and volumes only; input `{}` is neither", input.name.value))),
+        };
+        inputs.insert(input.name.value.clone(), made);
+    }
+    let Some(graph) = project.resolve(&request(&job, &inputs), &World::default()) else { return Err(project.failure(colour())) };
+    for (name, value) in graph.outputs() {
+        // Bound, so that it is computed and packed; never written.
+        let file = match graph.ty(value).kind() {
+            EdgeKind::Volume => "bench.nrrd",
+            EdgeKind::Mesh => "bench.ply",
+            EdgeKind::Image | EdgeKind::Table | EdgeKind::Scalar => "bench.png",
+        };
+        job.bind_output(name, file)?;
     }
     let copy_gb_s = session.copy_bandwidth(size)?;
     let mut reports: Vec<Report> = Vec::new();
@@ -93,7 +102,7 @@ fn one(session: &mut Session, a: &BenchArgs, size: [u32; 2]) -> Result<Value, Fa
     }))
 }
 
-/// Bytes of each pass over a whole run.
+/// Bytes of each pass over a whole run; a loop that ends by a value counts up to its first check.
 fn collect(steps: &[Step], times: u64, passes: &mut IndexMap<String, (Vec<String>, u64)>) {
     for step in steps {
         match step {
@@ -101,16 +110,28 @@ fn collect(steps: &[Step], times: u64, passes: &mut IndexMap<String, (Vec<String
                 passes.entry(name.clone()).or_insert_with(|| (nodes.clone(), 0)).1 += bytes * times;
             }
             Step::Repeat(r) => {
-                let n = match r.count {
-                    Times::Fixed(n) | Times::Until { max: n, .. } => n,
-                };
-                collect(&r.first, times * u64::from(n), passes);
+                collect(&r.first, times * u64::from(r.count.least()), passes);
             }
         }
     }
 }
 
 /// A half-float RGB picture of waves and noise: neither constant nor pure noise.
+/// A soft lumpy ball of 8-bit voxels in a cube of at most 512 a side.
+fn test_volume(size: [u32; 2]) -> Volume {
+    let n = size[0].min(size[1]).min(512);
+    let at = |i: u32| (i as f32 + 0.5) / n as f32 - 0.5;
+    let mut floats = Vec::with_capacity((n * n * n) as usize);
+    for (z, y) in (0..n).flat_map(|z| (0..n).map(move |y| (z, y))) {
+        for x in 0..n {
+            let [x, y, z] = [x, y, z].map(at);
+            let lumps = 0.05 * ((30.0 * x).sin() * (30.0 * y).sin() * (30.0 * z).sin());
+            floats.push(0.5 + 4.0 * (0.35 + lumps - (x * x + y * y + z * z).sqrt()));
+        }
+    }
+    Volume::of_floats([n; 3], 1, [1.0; 3], &floats, Voxel::U8)
+}
+
 fn test_picture(size: [u32; 2]) -> Picture {
     let [w, h] = size.map(|n| n as usize);
     let mut bytes = Vec::with_capacity(w * h * 6);

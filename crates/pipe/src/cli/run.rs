@@ -11,7 +11,9 @@ use pipe::project::Project;
 use pipe::run::{Job, Report, Session, decode, input_kinds};
 use pipe_graph::document::Document;
 use pipe_io::atomic::AtomicFile;
+use pipe_io::mesh::MeshFormat;
 use pipe_io::sequence::{FrameRange, Pattern};
+use pipe_io::volume::VolumeFormat;
 use pipe_io::{Source, Target};
 
 use super::args::{self, RunArgs};
@@ -175,11 +177,17 @@ pub(super) fn refuse_overwriting(job: &Job) -> Result<(), Failure> {
     Ok(())
 }
 
+/// Whether a file's name ends as those of tables, volumes and meshes do.
+fn is_no_image(file: &str) -> bool {
+    let path = Path::new(file);
+    let table = ["csv", "json", "npy", "svg"].iter().any(|e| file.to_lowercase().ends_with(e));
+    table || VolumeFormat::of_name(path).is_some() || MeshFormat::of(path).is_ok()
+}
+
 /// Resolves with the sizes in the files' headers, where they can be read cheaply.
 fn check_early(project: &mut Project, job: &Job) -> Result<(), Failure> {
     for file in job.outputs.values() {
-        let data = ["csv", "json", "npy", "svg", "nrrd", "raw", "obj", "ply"].iter().any(|e| file.to_lowercase().ends_with(e));
-        if !data {
+        if !is_no_image(file) {
             Target::parse(file)?;
         }
     }
