@@ -9,8 +9,8 @@ use std::path::Path;
 use pipe::run::{Job, Session};
 use pipe_graph::pass::Limits;
 use pipe_graph::reference::{Block, Tensor};
-use pipe_graph::types::EdgeType;
-use pipe_tests::bench::{Bench, Values, compile};
+use pipe_graph::types::{EdgeType, Element};
+use pipe_tests::bench::{Bench, Values, compile, reference};
 use pipe_tests::source::{edge, edge_type};
 
 type Vector = [f64; 3];
@@ -154,6 +154,24 @@ fn both_orders_of_compositing_agree() {
             assert!(off < 1e-4, "{body}, e = {exponent}, c = {center}: off by {off}");
             assert!(values["front"].iter().any(|v| *v > 0.1), "there is something to see");
         }
+    }
+}
+
+/// Rays leap over bricks that a table makes transparent, and see what they would see without.
+#[test]
+fn tables_with_empty_ends_agree_with_the_twin() {
+    let row = |alpha: f64| [0.9, 0.5 * alpha, 0.2, alpha];
+    for alphas in [[0.0, 0.0, 0.0, 0.2, 0.4], [0.0, 0.0, 0.3, 0.0, 0.0], [0.1, 0.0, 0.0, 0.2, 0.0], [0.0; 5]] {
+        let table: Vec<f64> = alphas.iter().flat_map(|a| row(*a)).map(|v| f64::from(v as f32)).collect();
+        let text = r#"Graph(version: 1, inputs: {"volume": Volume, "table": Table}, nodes: {
+            "seen": VolumeRender(volume: "volume", transfer: "table", steps: 90, camera: (eye: (1.6, 1.9, -1.2), size: (40, 37)))
+        }, outputs: {"out": "seen"})"#;
+        let types = [("volume", EdgeType::volume([21, 18, 15], 1)), ("table", EdgeType::table(20, Element::F32))];
+        let graph = compile(text, &types).unwrap_or_else(|e| panic!("{e}"));
+        let input = |name: &str| if name == "table" { Tensor::Table(table.clone()) } else { edge("volume", [1, 1]) };
+        let (got, expected) = (Bench::new().gpu(&graph, &input).unwrap(), reference(&graph, &input));
+        let off = got["out"].iter().zip(&expected["out"]).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+        assert!(off < 1e-4, "{alphas:?}: off by {off}");
     }
 }
 
