@@ -282,12 +282,44 @@ fn the_mesh_of_a_sphere_is_a_sphere() {
 fn the_mesh_of_a_torus_has_a_hole() {
     let ring = mesh(
         r#""ring": VolumeShape(shape: Torus, resolution: [64, 64, 32], size: 0.3, softness: 0.1),
-           "mesh": MarchingCubes(volume: "ring")"#,
+           "mesh": MarchingCubes(volume: "ring", extent: (10, 20, 15))"#,
     );
     ring.assert_watertight();
     assert_eq!(ring.euler(), 0);
-    let volume = 2.0 * std::f64::consts::PI.powi(2) * 0.3 * 0.1 * 0.1;
+    let volume = 2.0 * std::f64::consts::PI.powi(2) * 0.3 * 0.1 * 0.1 * 3000.0;
     assert!((ring.volume() / volume - 1.0).abs() < 0.02, "volume {}, not {volume}", ring.volume());
+}
+
+/// The preset `mesh` on a scan of a ball of 3 mm, whose voxels are 0.5 mm by 0.25 mm by 0.4 mm.
+#[test]
+fn the_mesh_of_a_scan_has_its_size() {
+    use pipe_io::volume::{Volume, Voxel, write};
+    let (size, spacing) = ([20_u32, 40, 25], [0.5_f32, 0.25, 0.4]);
+    let folder = tempfile::tempdir().unwrap();
+    let mut floats = Vec::new();
+    for z in 0..size[2] {
+        for y in 0..size[1] {
+            for x in 0..size[0] {
+                let squared: f32 =
+                    [x, y, z].iter().zip(size).zip(spacing).map(|((i, n), d)| ((*i as f32 + 0.5 - n as f32 / 2.0) * d).powi(2)).sum();
+                floats.push((0.3 + 0.2 * (3.0 - squared.sqrt())).clamp(0.0, 1.0));
+            }
+        }
+    }
+    write(&folder.path().join("ball.nrrd"), &Volume::of_floats(size, 1, spacing, &floats, Voxel::F32)).unwrap();
+    let mut session = Session::open(&pipe_gpu::Choice::parse(&std::env::var("PIPE_DEVICE").unwrap_or_default()), None).unwrap();
+    let file = |name: &str| folder.path().join(name).display().to_string();
+    let mut job = Job::new("mesh");
+    job.settings = vec![("smooth".to_owned(), "0".to_owned())];
+    job.bind_input("in", &file("ball.nrrd"));
+    job.bind_output("out", &file("ball.ply")).unwrap();
+    session.run(&job).unwrap_or_else(|e| panic!("{e}"));
+    let ball = read_ply(&folder.path().join("ball.ply"));
+    ball.assert_watertight();
+    let volume = 4.0 / 3.0 * std::f64::consts::PI * 27.0;
+    assert!((ball.volume() / volume - 1.0).abs() < 0.02, "volume {}, not {volume}", ball.volume());
+    let lengths = ball.vertices.iter().map(|v| sub(*v, [5.0; 3])).map(|v| dot(v, v).sqrt());
+    assert!(lengths.into_iter().all(|r| (r - 3.0).abs() < 0.05));
 }
 
 /// Noise meets every ambiguous case, and the faces of the cube; a black border closes it there.
