@@ -49,12 +49,15 @@ fn lumps() -> Block {
     })
 }
 
+/// Parameters of the presets that would take a twin too long at their defaults.
+const SMALLER: [(&str, u32); 7] =
+    [("size", 96), ("photons", 4000), ("voxels", 12), ("paths", 2), ("width", 48), ("height", 27), ("steps", 60)];
+
 /// What a preset is given: a file, and the same in double precision.
 struct Subject {
     file: String,
     value: Tensor,
     ty: EdgeType,
-    settings: Vec<(String, String)>,
 }
 
 impl Subject {
@@ -65,7 +68,7 @@ impl Subject {
                 let file = path(INPUT);
                 let picture = raster(&read(&file));
                 let ty = EdgeType::image(picture.size, 4);
-                Some(Self { file, value: Tensor::Image(picture), ty, settings: Vec::new() })
+                Some(Self { file, value: Tensor::Image(picture), ty })
             }
             EdgeKind::Volume => {
                 let (file, block) = (folder.join("lumps.nrrd"), lumps());
@@ -73,8 +76,7 @@ impl Subject {
                 let volume = Volume::of_floats(block.size, 1, [1.0; 3], &floats, Voxel::F32);
                 pipe_io::volume::write(&file, &volume).unwrap_or_else(|e| panic!("{e}"));
                 let ty = EdgeType::volume(block.size, 1);
-                let settings = vec![("size".to_owned(), "96".to_owned())];
-                Some(Self { file: file.display().to_string(), value: Tensor::Volume(block), ty, settings })
+                Some(Self { file: file.display().to_string(), value: Tensor::Volume(block), ty })
             }
             _ => None,
         }
@@ -109,35 +111,57 @@ fn presets_agree_with_their_twins_and_goldens() {
     for name in presets::names() {
         let mut project = Project::open(name).unwrap_or_else(|e| panic!("{e}"));
         let document = project.document.clone().expect("presets parse");
-        if document.inputs.len() != 1 || document.outputs.len() != 1 {
+        if document.inputs.len() > 1 || document.outputs.is_empty() {
             continue;
         }
-        let Some(mut subject) = Subject::of(document.inputs[0].kind, folder.path()) else { continue };
-        subject.settings.retain(|(name, _)| document.params.iter().any(|p| p.name.value == *name));
+        let input = document.inputs.first().map(|i| i.name.value.clone());
+        let subject = document.inputs.first().and_then(|i| Subject::of(i.kind, folder.path()));
+        if input.is_some() != subject.is_some() {
+            continue;
+        }
+        // Pictures come small; of volumes the picture is made small, of sources everything.
+        let made_smaller = match subject.as_ref().map(|s| s.ty) {
+            None => SMALLER.as_slice(),
+            Some(EdgeType::Volume(_)) => &SMALLER[..1],
+            Some(_) => &[],
+        };
+        let smaller = made_smaller.iter().filter(|(name, _)| document.params.iter().any(|p| p.name.value == *name));
+        let settings: Vec<_> = smaller.map(|(name, value)| ((*name).to_owned(), value.to_string())).collect();
         let request = Request {
-            inputs: [(document.inputs[0].name.value.clone(), subject.ty)].into(),
-            settings: subject.settings.clone(),
+            inputs: input.iter().zip(&subject).map(|(name, s)| (name.clone(), s.ty)).collect(),
+            settings: settings.clone(),
             frame: 1.0,
             ..Request::default()
         };
         let graph = project.resolve(&request, &World::default()).unwrap_or_else(|| panic!("{}", project.render(false)));
-        let (_, value) = graph.outputs().next().expect("it has one output");
+        let (_, value) = graph.outputs().next().expect("it has an output");
         if graph.ty(value).kind() != EdgeKind::Image {
             continue;
         }
         seen += 1;
-        let twin = evaluate(&graph, &|_| subject.value.clone());
-        let Some(Tensor::Image(twin)) = twin.get(&value) else { panic!("{name} makes no image") };
+        // A user's shader has no twin; such a preset has its golden alone.
+        let twin = graph.iter().all(|(_, i)| i.kind != "Wgsl").then(|| {
+            let values = evaluate(&graph, &|_| subject.as_ref().expect("it is asked for its input").value.clone());
+            match values.get(&value) {
+                Some(Tensor::Image(raster)) => raster.clone(),
+                _ => panic!("{name} makes no image"),
+            }
+        });
 
         let out = folder.path().join(format!("{name}.png")).display().to_string();
         let mut job = Job::new(name);
-        job.settings = subject.settings;
-        job.bind_input(&document.inputs[0].name.value, &subject.file);
+        job.settings = settings;
+        if let (Some(input), Some(subject)) = (&input, &subject) {
+            job.bind_input(input, &subject.file);
+        }
         job.bind_output(&document.outputs[0].0.value, &out).expect("a png");
         session.run(&job).unwrap_or_else(|e| panic!("{name}: {e}"));
         let got = read(&out);
         let channels = got.channels.count();
-        let expected: Vec<i32> = twin.pixels.iter().flat_map(|p| stored(*p, channels)).collect();
+        let expected = match twin {
+            Some(twin) => twin.pixels.iter().flat_map(|p| stored(*p, channels)).collect(),
+            None => bytes(&got),
+        };
         let golden = path(&format!("golden/{name}.png"));
         if bless {
             let bytes = expected.iter().map(|v| *v as u8).collect();
@@ -155,6 +179,6 @@ fn presets_agree_with_their_twins_and_goldens() {
             }
         }
     }
-    assert!(seen >= 10, "only {seen} presets were tested");
+    assert!(seen >= 30, "only {seen} presets were tested");
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
 }

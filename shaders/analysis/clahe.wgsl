@@ -2,8 +2,8 @@
 //
 // Constants: TILES_X, TILES_Y, BINS, GREY.
 
-import package::lib::number::is_nan;
-import package::lib::wide::{bin_fraction, bin_index, wide_luminance};
+import package::lib::number::is_finite;
+import package::lib::wide::{place_in_bins, wide_luminance};
 
 /// A place in a bin through the curve of a tile: straight inside a bin.
 fn level(tile: vec2i, bin: i32, inside: f32) -> f32 {
@@ -18,18 +18,22 @@ fn level(tile: vec2i, bin: i32, inside: f32) -> f32 {
 fn apply(image: vec4f) -> vec4f {
     let luminance = wide_luminance(image.rgb);
     let y = luminance.x;
-    if is_nan(y) {
+    if !is_finite(y) {
         return image;
     }
-    let bin = clamp(bin_index(luminance, params.low, params.high, BINS), 0, BINS - 1);
-    let inside = bin_fraction(luminance, params.low, params.high, BINS, bin);
+    var place = place_in_bins(luminance, params.low, params.high, BINS);
+    if place.x < 0.0 {
+        place = vec2f();
+    } else if place.x >= f32(BINS) {
+        place = vec2f(f32(BINS - 1), 1.0);
+    }
     let tiles = vec2i(TILES_X, TILES_Y);
     let u = (vec2f(pixel()) + 0.5) * vec2f(tiles) / vec2f(size_out()) - 0.5;
     let f = u - floor(u);
     let a = clamp(vec2i(floor(u)), vec2i(), tiles - 1);
     let b = clamp(vec2i(floor(u)) + 1, vec2i(), tiles - 1);
-    let upper = mix(level(a, bin, inside), level(vec2i(b.x, a.y), bin, inside), f.x);
-    let lower = mix(level(vec2i(a.x, b.y), bin, inside), level(b, bin, inside), f.x);
+    let upper = mix(level(a, i32(place.x), place.y), level(vec2i(b.x, a.y), i32(place.x), place.y), f.x);
+    let lower = mix(level(vec2i(a.x, b.y), i32(place.x), place.y), level(b, i32(place.x), place.y), f.x);
     let h = mix(upper, lower, f.y);
     if GREY {
         return vec4f(h);

@@ -1,4 +1,4 @@
-// Each pixel to the level of its bin: colours scaled by H/Y, grey images set to H. NaN passes through.
+// Each pixel to the level of its bin: colours scaled by H/Y, grey images set to H. NaN and infinity pass through.
 
 import package::lib::wide::{bin_of_pixel, exact_luminance};
 

@@ -1,9 +1,14 @@
 // Counts the pixels of a tile by bin. PRIVATE: in workgroup memory first, then in the table once a group.
 //
 // Constants: the walk (LANES, TILE), BINS, SLOTS (bins in workgroup memory), CHANNEL, CLAMPED. A thread that meets
-// the same bin again only lengthens its run: neighbouring pixels are often alike.
+// the same bin again only lengthens its run: neighbouring pixels are often alike. Few pixels need exact arithmetic,
+// so a thread leaves the quick loop at those: where threads run in lockstep, or as the lanes of a CPU, code behind
+// a condition would be paid for by every pixel.
 
-import package::lib::wide::bin_of_pixel;
+import package::lib::wide::{bin_of_pixel, quick_bin_of_pixel};
+
+const ACROSS = (TILE_X + LANES_X - 1) / LANES_X;
+const DOWN = (TILE_Y + LANES_Y - 1) / LANES_Y;
 
 var<workgroup> tallies: array<atomic<u32>, SLOTS>;
 
@@ -30,13 +35,26 @@ fn main(
         }
         workgroupBarrier();
     }
-    let first = vec2i(group.xy) * vec2i(TILE_X, TILE_Y);
-    let last = min(first + vec2i(TILE_X, TILE_Y), size_image());
+    let size = size_image();
+    let first = vec2i(group.xy) * vec2i(TILE_X, TILE_Y) + vec2i(local.xy);
+    let end = ACROSS * min(DOWN, (size.y - first.y + LANES_Y - 1) / LANES_Y);
     var run = 0;
     var length = 0u;
-    for (var y = first.y + i32(local.y); y < last.y; y += LANES_Y) {
-        for (var x = first.x + i32(local.x); x < last.x; x += LANES_X) {
-            let bin = bin_of_pixel(load_image(vec2i(x, y)), CHANNEL, params.low, params.high, BINS, CLAMPED);
+    var i = 0;
+    while i < end {
+        var pixel = vec4f();
+        var bin = -1;
+        while i < end {
+            let xy = first + vec2i(i % ACROSS, i / ACROSS) * vec2i(LANES_X, LANES_Y);
+            i += 1;
+            bin = -1;
+            if xy.x < size.x {
+                pixel = load_image(xy);
+                bin = quick_bin_of_pixel(pixel, CHANNEL, params.low, params.high, BINS, CLAMPED);
+            }
+            if bin == -2 {
+                break;
+            }
             if bin >= 0 {
                 if bin != run {
                     tally(run, length);
@@ -44,6 +62,12 @@ fn main(
                     length = 0u;
                 }
                 length += 1u;
+            }
+        }
+        if bin == -2 {
+            bin = bin_of_pixel(pixel, CHANNEL, params.low, params.high, BINS, CLAMPED);
+            if bin >= 0 {
+                tally(bin, 1u);
             }
         }
     }

@@ -1,5 +1,6 @@
 // DECODE, ENCODE: 0 linear, 1 sRGB, 2 ITU-R BT.709.
 
+import package::lib::color::keep_nan;
 import package::lib::transfer::{srgb_to_linear, linear_to_srgb};
 
 fn bt709_to_linear(v: vec3f) -> vec3f {
@@ -15,15 +16,17 @@ fn linear_to_bt709(v: vec3f) -> vec3f {
 fn apply(image: vec4f) -> vec4f {
     var c = image.rgb;
     if DECODE == 1 {
-        c = srgb_to_linear(c);
+        c = keep_nan(srgb_to_linear(c), c);
     } else if DECODE == 2 {
-        c = bt709_to_linear(c);
+        c = keep_nan(bt709_to_linear(c), c);
     }
-    c = vec3f(dot(params.row0, c), dot(params.row1, c), dot(params.row2, c));
+    if MIXES {
+        c = vec3f(dot(params.row0, c), dot(params.row1, c), dot(params.row2, c));
+    }
     if ENCODE == 1 {
-        c = linear_to_srgb(c);
+        c = keep_nan(linear_to_srgb(c), c);
     } else if ENCODE == 2 {
-        c = linear_to_bt709(c);
+        c = keep_nan(linear_to_bt709(c), c);
     }
     return vec4f(c, image.a);
 }

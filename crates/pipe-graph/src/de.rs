@@ -218,9 +218,15 @@ impl Range {
             || self.max.is_some_and(|m| v > m)
             || self.above.is_some_and(|m| v <= m)
             || self.below.is_some_and(|m| v >= m);
-        if wrong {
-            let low = self.min.map(|m| format!("at least {m}")).or(self.above.map(|m| format!("more than {m}")));
-            let high = self.max.map(|m| format!("at most {m}")).or(self.below.map(|m| format!("less than {m}")));
+        // A number that does not even fit its type is told already.
+        if wrong && !diagnostics.iter().any(|d| d.span == tree.span) {
+            let (low, high) = match (self.min, self.max) {
+                (Some(a), Some(b)) => (Some(format!("{a} to {b}")), None),
+                _ => (
+                    self.min.map(|m| format!("at least {m}")).or(self.above.map(|m| format!("more than {m}"))),
+                    self.max.map(|m| format!("at most {m}")).or(self.below.map(|m| format!("less than {m}"))),
+                ),
+            };
             let range: Vec<_> = low.into_iter().chain(high).collect();
             diagnostics.push(
                 Diagnostic::error(tree.span, format!("`{field}` is {v}, out of its range")).label(format!("expected {}", range.join(", "))),
@@ -247,6 +253,7 @@ fn describe(value: &Syntax) -> String {
         Syntax::Bool(b) => format!("`{b}`"),
         Syntax::Integer(v) => format!("the number {v}"),
         Syntax::Float(v) => format!("the number {v}"),
+        Syntax::Text(t) if t.starts_with('=') => format!("the expression \"{t}\""),
         Syntax::Text(t) => format!("the text \"{t}\""),
         Syntax::None => "`None`".into(),
         Syntax::Tuple(Some(name), _) | Syntax::Struct(Some(name), _) => format!("`{}`", name.value),
@@ -308,6 +315,11 @@ impl<'a> TreeDeserializer<'a> {
         result.map_err(|mut e| {
             if e.span.is_none() {
                 e.span = Some(self.tree.span);
+                // serde says which Rust type it is; a user wants to know what he wrote.
+                if e.message.starts_with("data did not match any variant of untagged enum") {
+                    e.message = format!("found {}", describe(&self.tree.value));
+                    e.label = "this field takes another kind of value".into();
+                }
             }
             e
         })
@@ -337,10 +349,16 @@ impl<'de> de::Deserializer<'de> for TreeDeserializer<'_> {
                 Ok(v) => self.place(visitor.visit_u64(v as u64)),
                 Err(_) => Err(self.wrong("a smaller number")),
             },
-            Syntax::Float(v) => self.place(visitor.visit_f64(*v)),
+            Syntax::Float(v) if v.is_finite() => self.place(visitor.visit_f64(*v)),
+            Syntax::Float(_) => Err(self.wrong("a finite number")),
             Syntax::Text(text) if text.starts_with('=') => {
                 let v = evaluate(text, self.tree.span, self.cx.env)?;
-                self.place(visitor.visit_f64(v))
+                // Where any type will do, a whole number may be meant as one.
+                if v.trunc() == v && (0.0..9e15).contains(&v) {
+                    self.place(visitor.visit_u64(v as u64))
+                } else {
+                    self.place(visitor.visit_f64(v))
+                }
             }
             Syntax::Text(text) => self.place(visitor.visit_str(text)),
             Syntax::None => self.place(visitor.visit_none()),
@@ -509,6 +527,11 @@ impl<'de> de::Deserializer<'de> for TreeDeserializer<'_> {
     fn deserialize_enum<V: Visitor<'de>>(self, _: &'static str, known: &'static [&'static str], visitor: V) -> Result<V::Value, Error> {
         match &self.tree.value {
             Syntax::Tuple(Some(_), _) | Syntax::Struct(Some(_), _) => self.place(visitor.visit_enum(Variant { d: self })),
+            Syntax::Text(text) if known.contains(&text.as_str()) => {
+                let mut e = self.wrong(&format!("`{text}`"));
+                e.hint = Some("a choice stands without quotes".into());
+                Err(e)
+            }
             _ => Err(self.wrong(&format!("one of {}", known.join(", ")))),
         }
     }
@@ -628,7 +651,11 @@ impl<'de> VariantAccess<'de> for TreeDeserializer<'_> {
     fn unit_variant(self) -> Result<(), Error> {
         match &self.tree.value {
             Syntax::Tuple(_, values) if values.is_empty() => Ok(()),
-            _ => Err(self.wrong("no values behind this name")),
+            Syntax::Tuple(Some(name), _) | Syntax::Struct(Some(name), _) => {
+                let name = &name.value;
+                Err(Error::at(self.tree.span, format!("`{name}` takes no values"), format!("expected `{name}`")))
+            }
+            _ => Err(self.wrong("a name")),
         }
     }
 

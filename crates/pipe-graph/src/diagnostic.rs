@@ -178,7 +178,11 @@ pub fn nearest<'c>(name: &str, candidates: impl IntoIterator<Item = &'c str>) ->
     let distance = |candidate: &str| {
         if candidate.eq_ignore_ascii_case(name) { 0 } else { strsim::damerau_levenshtein(candidate, name) }
     };
-    let close = |c: &&str| distance(c) <= 1 + name.chars().count().max(c.chars().count()) / 4;
+    let close = |c: &&str| {
+        let longest = name.chars().count().max(c.chars().count());
+        // Names that have no letter in common are not near, however short.
+        distance(c) <= 1 + longest / 4 && distance(c) < longest
+    };
     candidates.into_iter().filter(close).min_by_key(|c| (distance(c), *c))
 }
 
@@ -191,6 +195,7 @@ mod tests {
         assert_eq!(nearest("sigmaa", ["sigma", "radius"]), Some("sigma"));
         assert_eq!(nearest("blurh", ["BlurV", "BlurH"]), Some("BlurH"));
         assert_eq!(nearest("zebra", ["sigma", "radius"]), None);
+        assert_eq!(nearest("v", ["u"]), None);
     }
 
     #[test]

@@ -83,6 +83,8 @@ pub struct Document {
     pub path: PathBuf,
     /// Its id among the sources.
     pub file: FileId,
+    /// The word `Graph`: the place of what is missing.
+    pub head: Span,
     /// `name`, or the file's stem.
     pub name: String,
     /// `doc`
@@ -119,8 +121,9 @@ pub fn parse(path: &Path, text: &str, registry: &Registry, sources: &mut Sources
     {
         diagnostics.push(Diagnostic::error(head.span, format!("`{}` is no graph", head.value)).label("expected `Graph`"));
     }
+    let one = Span { end: tree.span.start + 1, ..tree.span };
     let mut reader = Reader { registry, diagnostics };
-    Some(reader.graph(path, file, &tree, fields))
+    Some(reader.graph(path, file, head.as_ref().map_or(one, |h| h.span), fields))
 }
 
 const SECTIONS: [&str; 7] = ["version", "name", "doc", "params", "inputs", "nodes", "outputs"];
@@ -132,23 +135,27 @@ pub(crate) struct Reader<'a> {
 }
 
 impl Reader<'_> {
-    fn graph(&mut self, path: &Path, file: FileId, tree: &Tree, fields: &[Field]) -> Document {
+    fn graph(&mut self, path: &Path, file: FileId, head: Span, fields: &[Field]) -> Document {
         let mut sections: IndexMap<&str, &Tree> = IndexMap::new();
+        // Sections that are there under a misspelt name are not missing as well.
+        let mut misspelt = Vec::new();
         for (key, value) in fields {
             if !SECTIONS.contains(&key.value.as_str()) {
-                let mut d = Diagnostic::error(key.span, format!("unknown section `{}`", key.value))
+                let d = Diagnostic::error(key.span, format!("unknown section `{}`", key.value))
                     .label(format!("expected one of {}", SECTIONS.join(", ")));
-                if let Some(near) = nearest(&key.value, SECTIONS) {
-                    d = d.hint(format!("did you mean `{near}`?"));
-                }
-                self.diagnostics.push(d);
-            } else if sections.insert(&key.value, value).is_some() {
-                self.diagnostics.push(Diagnostic::error(key.span, format!("`{}` is given twice", key.value)));
+                self.diagnostics.push(with_nearest(d, &key.value, SECTIONS));
+                misspelt.extend(nearest(&key.value, SECTIONS));
+            } else if sections.contains_key(key.value.as_str()) {
+                let d = Diagnostic::error(key.span, format!("`{}` is given twice", key.value));
+                self.diagnostics.push(d.label("remove one of them"));
+            } else {
+                sections.insert(&key.value, value);
             }
         }
         match sections.get("version").map(|t| (&t.value, t.span)) {
+            None if misspelt.contains(&"version") => {}
             None => self.diagnostics.push(
-                Diagnostic::error(Span { end: tree.span.start + 5, ..tree.span }, "the graph names no version")
+                Diagnostic::error(head, "the graph names no version")
                     .label("expected `version: 1`")
                     .hint(format!("this program reads versions up to {VERSION}")),
             ),
@@ -167,31 +174,46 @@ impl Reader<'_> {
         let doc = sections.get("doc").and_then(|t| self.text(t)).map(|t| t.value).unwrap_or_default();
         let params = sections.get("params").map(|t| self.params(t)).unwrap_or_default();
         let inputs = sections.get("inputs").map(|t| self.inputs(t)).unwrap_or_default();
-        let nodes = match sections.get("nodes") {
+        let mut nodes = match sections.get("nodes") {
             Some(nodes) => self.calls(nodes),
             None => {
-                self.diagnostics.push(Diagnostic::error(tree.span, "the graph has no nodes").label("expected `nodes: {…}`"));
+                if !misspelt.contains(&"nodes") {
+                    self.diagnostics.push(Diagnostic::error(head, "the graph has no nodes").label("expected `nodes: {…}`"));
+                }
                 Vec::new()
             }
         };
-        for input in &inputs {
-            if let Some(call) = nodes.iter().find(|c| c.name.value == input.name.value) {
+        nodes.retain(|call| {
+            let free = inputs.iter().all(|input| input.name.value != call.name.value);
+            if !free {
                 self.diagnostics.push(
                     Diagnostic::error(call.name.span, format!("`{}` is already the name of a graph input", call.name.value))
+                        .label("the name is taken")
                         .hint("give the node another name"),
                 );
             }
-        }
+            free
+        });
         let outputs = sections.get("outputs").map(|t| self.outputs(t)).unwrap_or_default();
-        Document { path: path.to_owned(), file, name: name.unwrap_or(stem), doc, params, inputs, nodes, outputs }
+        Document { path: path.to_owned(), file, head, name: name.unwrap_or(stem), doc, params, inputs, nodes, outputs }
     }
 
     fn text(&mut self, tree: &Tree) -> Option<Spanned<String>> {
-        if let Syntax::Text(text) = &tree.value {
-            return Some(Spanned { span: tree.span, value: text.clone() });
+        match &tree.value {
+            Syntax::Text(text) => Some(Spanned { span: tree.span, value: text.clone() }),
+            // What was meant is clear, so that nothing else is wrong because of it.
+            Syntax::Tuple(Some(name), values) if values.is_empty() => {
+                self.diagnostics.push(
+                    Diagnostic::error(tree.span, format!("`{}` stands without quotes", name.value))
+                        .label(format!("expected `\"{}\"`", name.value)),
+                );
+                Some(name.clone())
+            }
+            _ => {
+                self.diagnostics.push(Diagnostic::error(tree.span, "this is no text").label("expected a string in quotes"));
+                None
+            }
         }
-        self.diagnostics.push(Diagnostic::error(tree.span, "this is no text").label("expected a string in quotes"));
-        None
     }
 
     /// The entries of a map with text keys; duplicates are reported and left out.
@@ -209,7 +231,9 @@ impl Reader<'_> {
             let Some(name) = self.text(key) else { continue };
             if read.iter().any(|(other, _)| other.value == name.value) {
                 self.diagnostics.push(
-                    Diagnostic::error(name.span, format!("`{}` is defined twice", name.value)).hint("names are unique; rename one of them"),
+                    Diagnostic::error(name.span, format!("`{}` is defined twice", name.value))
+                        .label("the name is taken")
+                        .hint("names are unique; rename one of them"),
                 );
             } else {
                 read.push((name, value));
@@ -234,25 +258,28 @@ impl Reader<'_> {
         let mut params = Vec::new();
         for (name, value) in self.entries(tree, "params") {
             self.check_name(&name);
-            params.extend(self.param(name, value));
+            params.push(self.param(name, value));
         }
         params
     }
 
-    fn param(&mut self, name: Spanned<String>, value: &Tree) -> Option<Parameter> {
+    /// A parameter; one that is wrong is there all the same, so that its name is known where it is used.
+    fn param(&mut self, name: Spanned<String>, value: &Tree) -> Parameter {
         const TYPES: [&str; 4] = ["F32", "I32", "U32", "Bool"];
+        let stand_in = Tree { span: value.span, value: Syntax::Integer(1) };
+        let mut read = Parameter { name, ty: ParameterType::F32, default: stand_in.clone(), min: None, max: None, doc: String::new() };
         let (head, fields) = match &value.value {
             Syntax::Struct(Some(head), fields) => (head, fields.as_slice()),
             Syntax::Tuple(Some(head), values) if values.is_empty() => (head, [].as_slice()),
             _ => {
                 self.diagnostics.push(
-                    Diagnostic::error(value.span, format!("`{}` is no parameter", name.value))
+                    Diagnostic::error(value.span, format!("`{}` is no parameter", read.name.value))
                         .label("expected such as `F32(default: 1.0, min: 0.0, max: 2.0, doc: \"…\")`"),
                 );
-                return None;
+                return read;
             }
         };
-        let ty = match head.value.as_str() {
+        read.ty = match head.value.as_str() {
             "F32" => ParameterType::F32,
             "I32" => ParameterType::I32,
             "U32" => ParameterType::U32,
@@ -261,17 +288,16 @@ impl Reader<'_> {
                 let d = Diagnostic::error(head.span, format!("unknown parameter type `{other}`"))
                     .label(format!("expected one of {}", TYPES.join(", ")));
                 self.diagnostics.push(with_nearest(d, other, TYPES));
-                return None;
+                return read;
             }
         };
-        let mut read = Parameter { name, ty, default: value.clone(), min: None, max: None, doc: String::new() };
         let mut default = None;
         for (key, value) in fields {
             match key.value.as_str() {
                 "default" => default = Some(value.clone()),
                 "min" => read.min = self.number(value),
                 "max" => read.max = self.number(value),
-                "doc" => read.doc = self.text(value)?.value,
+                "doc" => read.doc = self.text(value).map(|t| t.value).unwrap_or_default(),
                 other => {
                     let names = ["default", "min", "max", "doc"];
                     let d = Diagnostic::error(key.span, format!("a parameter has no `{other}`"))
@@ -282,13 +308,13 @@ impl Reader<'_> {
         }
         if let Some(default) = default {
             read.default = default;
-            Some(read)
         } else {
+            (read.min, read.max) = (None, None);
             self.diagnostics.push(
                 Diagnostic::error(value.span, format!("parameter `{}` has no default", read.name.value)).label("expected `default: …`"),
             );
-            None
         }
+        read
     }
 
     fn number(&mut self, tree: &Tree) -> Option<f64> {
@@ -313,6 +339,7 @@ impl Reader<'_> {
                 _ => {
                     self.diagnostics
                         .push(Diagnostic::error(value.span, "this is no type of input").label("expected Image, Volume or Table"));
+                    inputs.push(Input { name, kind: EdgeKind::Image, doc: String::new() });
                     continue;
                 }
             };
@@ -320,6 +347,7 @@ impl Reader<'_> {
                 let d = Diagnostic::error(head.span, format!("a graph cannot take `{}` as an input", head.value))
                     .label("expected Image, Volume or Table");
                 self.diagnostics.push(with_nearest(d, &head.value, KINDS.map(|k| k.0)));
+                inputs.push(Input { name, kind: EdgeKind::Image, doc: String::new() });
                 continue;
             };
             let mut doc = String::new();
@@ -340,12 +368,20 @@ impl Reader<'_> {
         let mut calls = Vec::new();
         for (name, value) in self.entries(tree, "nodes") {
             self.check_name(&name);
-            calls.extend(self.call(name, value));
+            // What is no call is kept as one of no kind, so that its name is known where it is used.
+            let call = self.call(&name, value).unwrap_or_else(|| Call {
+                kind: Spanned { span: value.span, value: String::new() },
+                name,
+                fields: Vec::new(),
+                options: None,
+                span: value.span,
+            });
+            calls.push(call);
         }
         calls
     }
 
-    fn call(&mut self, name: Spanned<String>, value: &Tree) -> Option<Call> {
+    fn call(&mut self, name: &Spanned<String>, value: &Tree) -> Option<Call> {
         let (kind, fields) = match &value.value {
             Syntax::Struct(Some(kind), fields) => (kind, fields.clone()),
             Syntax::Tuple(Some(kind), values) if values.is_empty() => (kind, Vec::new()),
@@ -379,10 +415,10 @@ impl Reader<'_> {
             if key.value != "options" {
                 kept.push((key, tree));
             } else if options.replace(tree).is_some() {
-                self.diagnostics.push(Diagnostic::error(key.span, "`options` is given twice"));
+                self.diagnostics.push(Diagnostic::error(key.span, "`options` is given twice").label("remove one of them"));
             }
         }
-        Some(Call { name, kind: kind.clone(), fields: kept, options, span: value.span })
+        Some(Call { name: name.clone(), kind: kind.clone(), fields: kept, options, span: value.span })
     }
 
     /// Pairs of a name and an edge.

@@ -49,15 +49,45 @@ impl<'t> Reader<'t> {
             let line = &self.text[line_start..];
             line_start + line.char_indices().nth(p.col.saturating_sub(1)).map_or(line.len(), |(i, _)| i)
         };
-        let start = at(error.span.start).min(self.text.len());
-        let one = self.text[start..].chars().next().map_or(0, char::len_utf8);
-        let end = at(error.span.end).clamp(start + one, self.text.len());
-        let message = error.code.to_string();
-        let mut d = Diagnostic::error(Span::new(self.file, start..end), lower_first(&message)).label("here");
-        if matches!(error.code, ron::Error::ExceededRecursionLimit) {
-            d = d.hint(format!("values may be nested {MOST_DEPTH} deep"));
+        let (message, label, hint) = told(&error.code);
+        let mut start = at(error.span.start).min(self.text.len());
+        if let Some(open) = self.open_string(start) {
+            return Diagnostic::error(self.in_line(open, usize::MAX), "this string is not closed in its line")
+                .label("expected `\"` at its end");
         }
-        d
+        // ron means the next sign, and stands before the space in front of it.
+        start += self.text[start..].len() - self.text[start..].trim_start().len();
+        let end = match error.code {
+            _ if start >= self.text.trim_end().len() => {
+                start = self.text.trim_end().len();
+                start
+            }
+            ron::Error::ExpectedFloat | ron::Error::ExpectedInteger => {
+                let token = |c: char| c.is_alphanumeric() || matches!(c, '.' | '+' | '-' | '_');
+                start + self.text[start..].find(|c| !token(c)).unwrap_or(1)
+            }
+            _ => at(error.span.end),
+        };
+        let d = Diagnostic::error(self.in_line(start, end), message).label(label);
+        match hint {
+            Some(hint) => d.hint(hint),
+            None => d,
+        }
+    }
+
+    /// From a place to another or to the end of its line, at least one character.
+    fn in_line(&self, start: usize, end: usize) -> Span {
+        let rest = &self.text[start..];
+        let line = start + rest.find(['\n', '\r']).unwrap_or(rest.len());
+        let one = start + rest.chars().next().map_or(0, char::len_utf8);
+        Span::new(self.file, start..end.min(line).max(one).min(self.text.len()))
+    }
+
+    /// Where a string begins that ends right before this place, lines further down: nobody meant that.
+    fn open_string(&self, end: usize) -> Option<usize> {
+        let before = self.text[..end].strip_suffix('"')?;
+        let start = before.rfind('"')?;
+        before[start..].contains('\n').then_some(start)
     }
 
     /// The place of a part of the text.
@@ -137,6 +167,33 @@ impl<'t> Reader<'t> {
         let fail = |e: ron::Error| Diagnostic::error(whole, lower_first(&e.to_string())).label("here");
         let mut ron = ron::Deserializer::from_str_with_options(text, &options).map_err(|e| fail(e.code))?;
         ron.deserialize_any(PartsVisitor { map }).map_err(fail)
+    }
+}
+
+/// What a syntax error is called, what was expected, and the next step.
+fn told(code: &ron::Error) -> (String, String, Option<String>) {
+    use ron::Error as E;
+    let say = |message: &str, label: &str, hint: Option<&str>| (message.to_owned(), label.to_owned(), hint.map(str::to_owned));
+    match code {
+        E::Eof => say("the file ends too early", "something is missing here", Some("is every bracket closed?")),
+        E::ExpectedComma => say(
+            "the value before this has ended",
+            "expected a comma or the closing bracket",
+            Some("a comma stands between values, a colon between a name and its value"),
+        ),
+        E::ExpectedIdentifier => say("this is no name of a field", "expected a name or `)`", Some("is every bracket closed?")),
+        E::ExpectedMapColon | E::ExpectedNamedStructLike(_) => say("a name needs a value", "expected `:`", None),
+        E::ExpectedFloat | E::ExpectedInteger => say("this is no number", "expected a number", None),
+        E::UnexpectedChar(c) => (format!("`{c}` does not fit here"), "expected a value".into(), None),
+        E::InvalidEscape(_) => say(
+            "there is no such escape",
+            "expected `\\n`, `\\t`, `\\\"` or `\\\\`",
+            Some("a backslash is written twice; paths may be written with `/`"),
+        ),
+        E::TrailingCharacters => say("the graph has ended", "expected the end of the file", Some("all sections stand inside `Graph(…)`")),
+        E::UnclosedBlockComment => say("this comment is not closed", "expected `*/` behind it", None),
+        E::ExceededRecursionLimit => ("values are nested too deep".into(), format!("expected at most {MOST_DEPTH} levels"), None),
+        other => (lower_first(&other.to_string()), "here".into(), None),
     }
 }
 

@@ -91,7 +91,9 @@ pub fn check(path: &str, text: &str, stubs: &str, library: &[(&str, &str)]) -> R
                 let _ = write!(message, ": {inner}");
                 cause = inner.source();
             }
-            (message, e.spans().next().and_then(|(span, _)| span.to_range()))
+            // The whole function comes first, then what in it is wrong.
+            let places = e.spans().filter_map(|(span, _)| span.to_range());
+            (message, places.min_by_key(ExactSizeIterator::len))
         })
     };
     // naga recurses over long expressions; a hostile shader must not end the process.

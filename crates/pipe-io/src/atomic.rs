@@ -1,7 +1,8 @@
 //! Files that appear whole or not at all.
 //!
 //! A temporary file in the same folder (so that renaming does not copy), written, synced, then renamed over the target:
-//! an interrupted or failed run leaves the old file untouched. What is no regular file (`/dev/null`, a pipe) cannot be
+//! an interrupted or failed run leaves the old file untouched. On Linux the temporary file has no name until it is
+//! whole, so that even a killed process leaves nothing behind. What is no regular file (`/dev/null`, a pipe) cannot be
 //! replaced and is written directly; a symbolic link is followed, so that the link stays and its target changes.
 
 use std::fs::{self, File, OpenOptions, Permissions};
@@ -18,7 +19,17 @@ pub struct AtomicFile {
 
 #[derive(Debug)]
 enum Kind {
-    Temporary { file: NamedTempFile, target: PathBuf, permissions: Option<Permissions> },
+    Temporary {
+        file: NamedTempFile,
+        target: PathBuf,
+        permissions: Option<Permissions>,
+    },
+    #[cfg(target_os = "linux")]
+    Unnamed {
+        file: File,
+        target: PathBuf,
+        permissions: Option<Permissions>,
+    },
     Direct(File),
     Stdout(Stdout),
 }
@@ -48,8 +59,14 @@ impl AtomicFile {
             }
         }
         let folder = target.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
-        let name = target.file_name().unwrap_or_default().to_string_lossy();
-        let prefix = format!(".{name}.");
+        fs::metadata(folder)?;
+        let permissions = existing.map(|metadata| metadata.permissions());
+        // Where the file system has no files without names, a hidden one serves.
+        #[cfg(target_os = "linux")]
+        if let Ok(file) = unnamed::create(folder) {
+            return Ok(Self { kind: Kind::Unnamed { file, target, permissions } });
+        }
+        let prefix = hidden(&target);
         let mut builder = tempfile::Builder::new();
         builder.prefix(&prefix).suffix(".tmp");
         #[cfg(unix)]
@@ -61,7 +78,6 @@ impl AtomicFile {
         #[cfg(unix)]
         builder.permissions(everyone);
         let file = builder.tempfile_in(folder)?;
-        let permissions = existing.map(|metadata| metadata.permissions());
         Ok(Self { kind: Kind::Temporary { file, target, permissions } })
     }
 
@@ -75,6 +91,14 @@ impl AtomicFile {
                 }
                 file.as_file().sync_all()?;
                 file.persist(target).map(drop).map_err(|error| error.error)
+            }
+            #[cfg(target_os = "linux")]
+            Kind::Unnamed { file, target, permissions } => {
+                if let Some(permissions) = permissions {
+                    file.set_permissions(permissions)?;
+                }
+                file.sync_all()?;
+                unnamed::place(&file, &target)
             }
             Kind::Direct(mut file) => file.flush(),
             Kind::Stdout(mut stream) => stream.flush(),
@@ -93,6 +117,8 @@ impl Write for AtomicFile {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
         match &mut self.kind {
             Kind::Temporary { file, .. } => file.write(bytes),
+            #[cfg(target_os = "linux")]
+            Kind::Unnamed { file, .. } => file.write(bytes),
             Kind::Direct(file) => file.write(bytes),
             Kind::Stdout(stream) => stream.write(bytes),
         }
@@ -101,9 +127,59 @@ impl Write for AtomicFile {
     fn flush(&mut self) -> io::Result<()> {
         match &mut self.kind {
             Kind::Temporary { file, .. } => file.flush(),
+            #[cfg(target_os = "linux")]
+            Kind::Unnamed { file, .. } => file.flush(),
             Kind::Direct(file) => file.flush(),
             Kind::Stdout(stream) => stream.flush(),
         }
+    }
+}
+
+/// How the names of temporary files for a target begin.
+fn hidden(target: &Path) -> String {
+    format!(".{}.", target.file_name().unwrap_or_default().to_string_lossy())
+}
+
+/// Files without names: `O_TMPFILE`, and the link that gives them one.
+#[cfg(target_os = "linux")]
+mod unnamed {
+    use std::fs::{self, File, OpenOptions};
+    use std::io;
+    use std::os::fd::AsRawFd;
+    use std::os::unix::fs::OpenOptionsExt;
+    use std::path::Path;
+
+    use rustix::fs::{AtFlags, CWD, OFlags, linkat};
+
+    /// Fails where the file system has none, or where there is no way to name one later.
+    pub(super) fn create(folder: &Path) -> io::Result<File> {
+        fs::metadata("/proc/self/fd")?;
+        OpenOptions::new().read(true).write(true).mode(0o666).custom_flags(OFlags::TMPFILE.bits().cast_signed()).open(folder)
+    }
+
+    /// Gives the file its name. A name that is taken is given by way of a second one, for links replace nothing.
+    pub(super) fn place(file: &File, target: &Path) -> io::Result<()> {
+        let link = |name: &Path| {
+            let source = format!("/proc/self/fd/{}", file.as_raw_fd());
+            linkat(CWD, source, CWD, name, AtFlags::SYMLINK_FOLLOW).map_err(io::Error::from)
+        };
+        match link(target) {
+            Err(error) if error.kind() == io::ErrorKind::AlreadyExists => {}
+            other => return other,
+        }
+        for n in 0_u64.. {
+            let second = target.with_file_name(format!("{}{}-{n}.tmp", super::hidden(target), std::process::id()));
+            match link(&second) {
+                Ok(()) => {
+                    return fs::rename(&second, target).inspect_err(|_| {
+                        let _ = fs::remove_file(&second);
+                    });
+                }
+                Err(error) if error.kind() == io::ErrorKind::AlreadyExists => {}
+                Err(error) => return Err(error),
+            }
+        }
+        unreachable!("some number is free")
     }
 }
 
@@ -136,7 +212,8 @@ mod tests {
         fs::write(&path, "old").unwrap();
         let mut file = AtomicFile::create(Some(&path)).unwrap();
         file.write_all(b"half").unwrap();
-        assert!(names(folder.path())[0].starts_with(".a.txt."));
+        #[cfg(target_os = "linux")]
+        assert_eq!(names(folder.path()), ["a.txt"]);
         drop(file);
         assert_eq!((names(folder.path()), fs::read(&path).unwrap()), (vec!["a.txt".to_owned()], b"old".to_vec()));
         AtomicFile::write_whole(Some(&path), b"new").unwrap();

@@ -97,7 +97,7 @@ impl Compression {
             Format::Exr => {
                 &[Self::Zip, Self::None, Self::Rle, Self::Zips, Self::Piz, Self::Pxr24, Self::B44, Self::B44a, Self::Dwaa, Self::Dwab]
             }
-            Format::Png => &[Self::Fastest, Self::Balanced, Self::Best],
+            Format::Png | Format::Apng => &[Self::Fastest, Self::Balanced, Self::Best],
             Format::Tiff => &[Self::None, Self::Lzw, Self::Deflate, Self::Packbits],
             _ => &[],
         }
@@ -166,7 +166,8 @@ const fn holds(format: Format) -> (&'static [Sample], &'static [Channels]) {
     use Sample::{F16, F32, U8, U16};
     match format {
         Format::Exr => (&[F32, F16], &[Y, Ya, Rgb, Rgba]),
-        Format::Png => (&[U8, U16], &[Y, Ya, Rgb, Rgba]),
+        Format::Png | Format::Apng => (&[U8, U16], &[Y, Ya, Rgb, Rgba]),
+        Format::Gif => (&[U8], &[Rgb, Rgba]),
         Format::Tiff => (&[U8, U16, F32], &[Y, Ya, Rgb, Rgba]),
         Format::Jpeg => (&[U8], &[Y, Rgb]),
         Format::WebP => (&[U8], &[Y, Ya, Rgb, Rgba]),

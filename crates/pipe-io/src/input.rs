@@ -61,9 +61,9 @@ impl Input {
         let layer = self.layer()?;
         let decoded = shielded(|| match self.format {
             Format::Exr => exr::decode(bytes, layer, limits),
-            Format::Png => png::decode(bytes, limits, profiles),
+            Format::Png | Format::Apng => png::decode(bytes, limits, profiles),
             Format::Tiff => tiff::decode(bytes, limits, profiles),
-            Format::Jpeg | Format::WebP | Format::Hdr | Format::Qoi => raster::decode(self.format, bytes, limits, profiles),
+            Format::Jpeg | Format::WebP | Format::Hdr | Format::Qoi | Format::Gif => raster::decode(self.format, bytes, limits, profiles),
             Format::Pfm => plain::pfm_decode(bytes, limits),
             Format::Npy => plain::npy_decode(bytes, limits),
         });
@@ -80,9 +80,9 @@ impl Input {
         let layer = self.layer()?;
         let header = shielded(|| match self.format {
             Format::Exr => exr::header(bytes, length, layer, limits),
-            Format::Png => png::header(bytes, limits, profiles),
+            Format::Png | Format::Apng => png::header(bytes, limits, profiles),
             Format::Tiff => tiff::header(bytes, limits, profiles),
-            Format::Jpeg | Format::WebP | Format::Hdr | Format::Qoi => raster::header(self.format, bytes, limits, profiles),
+            Format::Jpeg | Format::WebP | Format::Hdr | Format::Qoi | Format::Gif => raster::header(self.format, bytes, limits, profiles),
             Format::Pfm => plain::pfm_header(bytes, limits),
             Format::Npy => plain::npy_header(bytes, limits),
         });

@@ -22,6 +22,7 @@
 
 #![forbid(unsafe_code)]
 
+mod animation;
 pub mod atomic;
 pub mod colour;
 mod error;
@@ -44,6 +45,7 @@ pub mod table;
 mod tiff;
 pub mod volume;
 
+pub use self::animation::Animation;
 pub use self::colour::{Colorspace, Colour, Primaries, Transfer};
 pub use self::error::{Error, Result};
 pub use self::exr::Attributes;

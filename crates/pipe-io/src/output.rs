@@ -43,11 +43,11 @@ fn encode_to(out: &mut dyn Write, target: &Target, picture: &Picture, options: &
         let mut seekable = Cursor::new(Vec::new());
         match format {
             Format::Exr => return exr::encode(out, picture, compression, tag),
-            Format::Png => return png::encode(out, picture, compression, tag),
+            Format::Png | Format::Apng => return png::encode(out, picture, compression, tag),
             Format::Pfm => return plain::pfm_encode(out, picture),
             Format::Npy => return plain::npy_encode(out, picture),
             Format::Tiff => tiff::encode(&mut seekable, picture, compression)?,
-            Format::Jpeg | Format::WebP | Format::Hdr | Format::Qoi => {
+            Format::Jpeg | Format::WebP | Format::Hdr | Format::Qoi | Format::Gif => {
                 raster::encode(format, &mut seekable, picture, options.quality)?;
             }
         }
@@ -61,7 +61,7 @@ fn encode_to(out: &mut dyn Write, target: &Target, picture: &Picture, options: &
 }
 
 /// Checks that the picture is whole and in the form that its target wants.
-fn check(target: &Target, picture: &Picture, options: &WriteOptions) -> Result<()> {
+pub(crate) fn check(target: &Target, picture: &Picture, options: &WriteOptions) -> Result<()> {
     let refuse = |reason: String| Error::Form { file: target.to_string(), reason };
     let expected = Picture::byte_count(picture.width, picture.height, picture.channels, picture.sample);
     if picture.width == 0 || picture.height == 0 || expected != Some(picture.bytes.len()) {
@@ -69,7 +69,7 @@ fn check(target: &Target, picture: &Picture, options: &WriteOptions) -> Result<(
         return Err(refuse(format!("{bytes} bytes are no picture of {w}×{h} pixels")));
     }
     let largest = match target.format {
-        Format::Jpeg => 65_535,
+        Format::Jpeg | Format::Gif => 65_535,
         Format::WebP => 16_383,
         _ => i32::MAX as u32,
     };

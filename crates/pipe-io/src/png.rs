@@ -110,6 +110,13 @@ fn cicp(info: &png::Info<'_>) -> Option<Colour> {
 }
 
 pub(crate) fn encode(out: &mut dyn Write, picture: &Picture, compression: Compression, tag_colour: bool) -> Result<(), Fault> {
+    let mut writer = encoder(out, picture, compression, tag_colour).write_header().map_err(failure)?;
+    put(&mut writer, picture)?;
+    writer.finish().map_err(failure)
+}
+
+/// An encoder for pictures like this one.
+pub(crate) fn encoder<W: Write>(out: W, picture: &Picture, compression: Compression, tag_colour: bool) -> png::Encoder<'static, W> {
     let mut encoder = png::Encoder::new(out, picture.width, picture.height);
     encoder.set_color(match picture.channels {
         Channels::Y => png::ColorType::Grayscale,
@@ -126,18 +133,21 @@ pub(crate) fn encode(out: &mut dyn Write, picture: &Picture, compression: Compre
     if tag_colour {
         tag(&mut encoder, &picture.colour);
     }
-    let mut writer = encoder.write_header().map_err(failure)?;
+    encoder
+}
+
+/// Writes the pixels of one frame.
+pub(crate) fn put<W: Write>(writer: &mut png::Writer<W>, picture: &Picture) -> Result<(), Fault> {
     if picture.sample == Sample::U16 {
         let mut swapped = picture.bytes.clone();
         swap_to_native(&mut swapped);
-        writer.write_image_data(&swapped).map_err(failure)?;
+        writer.write_image_data(&swapped).map_err(failure)
     } else {
-        writer.write_image_data(&picture.bytes).map_err(failure)?;
+        writer.write_image_data(&picture.bytes).map_err(failure)
     }
-    writer.finish().map_err(failure)
 }
 
-fn tag(encoder: &mut png::Encoder<'_, &mut dyn Write>, colour: &Colour) {
+fn tag<W: Write>(encoder: &mut png::Encoder<'_, W>, colour: &Colour) {
     if *colour == Colour::SRGB {
         encoder.set_source_srgb(png::SrgbRenderingIntent::Perceptual);
         return;
@@ -172,7 +182,7 @@ fn fault(error: png::DecodingError) -> Fault {
     }
 }
 
-fn failure(error: png::EncodingError) -> Fault {
+pub(crate) fn failure(error: png::EncodingError) -> Fault {
     match error {
         png::EncodingError::IoError(error) => Fault::Io(error),
         other => Fault::Form(other.to_string()),

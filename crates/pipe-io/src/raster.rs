@@ -1,10 +1,11 @@
-//! JPEG, WebP and Radiance HDR, over the `image` crate, and QOI.
+//! JPEG, WebP, GIF and Radiance HDR, over the `image` crate, and QOI.
 //!
 //! The `image` crate's generic `DynamicImage` is not used: its decoders fill a byte buffer, which is all a picture is.
 //! HDR radiance is divided by the file's `EXPOSURE` here (a header value that hardly any file has).
 
 use std::io::{Cursor, Seek, Write};
 
+use image::codecs::gif::{GifDecoder, GifEncoder};
 use image::codecs::hdr::{HdrDecoder, HdrEncoder};
 use image::codecs::jpeg::{JpegDecoder, JpegEncoder};
 use image::codecs::webp::{WebPDecoder, WebPEncoder};
@@ -33,6 +34,7 @@ pub(crate) fn header(format: Format, bytes: &[u8], limits: &Limits, profiles: bo
             let header = describe(format, &decoder, limits)?;
             tagged(header, &mut decoder, profiles)
         }
+        Format::Gif => describe(format, &GifDecoder::new(Cursor::new(bytes)).map_err(fault)?, limits),
         Format::Hdr => describe(format, &HdrDecoder::new(hdr_bytes(bytes)).map_err(fault)?, limits),
         _ => {
             let found = qoi::decode_header(bytes).map_err(|error| Fault::damaged(error.to_string()))?;
@@ -63,6 +65,11 @@ pub(crate) fn decode(format: Format, bytes: &[u8], limits: &Limits, profiles: bo
             let header = describe(format, &decoder, limits)?;
             let profile = decoder.icc_profile().map_err(fault)?;
             icc::apply(profile.as_deref().filter(|_| profiles), fill(header, decoder)?)
+        }
+        Format::Gif => {
+            // Of a moving picture the first frame.
+            let decoder = GifDecoder::new(Cursor::new(bytes)).map_err(fault)?;
+            fill(describe(format, &decoder, limits)?, decoder)
         }
         Format::Hdr => {
             let decoder = HdrDecoder::new(hdr_bytes(bytes)).map_err(fault)?;
@@ -192,6 +199,7 @@ pub(crate) fn encode(format: Format, out: &mut (impl Write + Seek), picture: &Pi
     };
     match format {
         Format::Jpeg => JpegEncoder::new_with_quality(out, quality).write_image(&picture.bytes, width, height, kind),
+        Format::Gif => GifEncoder::new(out).encode(&picture.bytes, width, height, kind),
         Format::WebP => WebPEncoder::new_lossless(out).write_image(&picture.bytes, width, height, kind),
         Format::Hdr => HdrEncoder::new(out).write_image(&representable(&picture.bytes), width, height, kind),
         _ => {

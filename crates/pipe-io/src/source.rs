@@ -34,11 +34,16 @@ pub enum Format {
     Qoi,
     /// NumPy array.
     Npy,
+    /// Graphics Interchange Format: one picture or a moving one, of 256 colours each.
+    Gif,
+    /// Animated PNG: a moving picture; alone it is a PNG.
+    Apng,
 }
 
 impl Format {
     /// Every format.
-    pub const ALL: [Self; 9] = [Self::Exr, Self::Png, Self::Jpeg, Self::Tiff, Self::Hdr, Self::Pfm, Self::WebP, Self::Qoi, Self::Npy];
+    pub const ALL: [Self; 11] =
+        [Self::Exr, Self::Png, Self::Jpeg, Self::Tiff, Self::Hdr, Self::Pfm, Self::WebP, Self::Qoi, Self::Npy, Self::Gif, Self::Apng];
 
     /// The format's own name.
     pub const fn name(self) -> &'static str {
@@ -52,6 +57,8 @@ impl Format {
             Self::WebP => "WebP",
             Self::Qoi => "QOI",
             Self::Npy => "NPY",
+            Self::Gif => "GIF",
+            Self::Apng => "APNG",
         }
     }
 
@@ -67,12 +74,14 @@ impl Format {
             Self::WebP => &["webp"],
             Self::Qoi => &["qoi"],
             Self::Npy => &["npy"],
+            Self::Gif => &["gif"],
+            Self::Apng => &["apng"],
         }
     }
 
     /// The format that begins with these bytes (12 are enough).
     pub fn sniff(bytes: &[u8]) -> Option<Self> {
-        const MAGIC: [(&[u8], Format); 13] = [
+        const MAGIC: [(&[u8], Format); 14] = [
             (&[0x76, 0x2f, 0x31, 0x01], Format::Exr),
             (b"\x89PNG\r\n\x1a\n", Format::Png),
             (&[0xff, 0xd8, 0xff], Format::Jpeg),
@@ -85,6 +94,7 @@ impl Format {
             (b"PF", Format::Pfm),
             (b"Pf", Format::Pfm),
             (b"qoif", Format::Qoi),
+            (b"GIF8", Format::Gif),
             (b"\x93NUMPY", Format::Npy),
         ];
         if bytes.len() >= 12 && bytes.starts_with(b"RIFF") && &bytes[8..12] == b"WEBP" {
@@ -93,6 +103,11 @@ impl Format {
         let (magic, format) = MAGIC.into_iter().find(|(magic, _)| bytes.starts_with(magic))?;
         // Two letters are little evidence: a PFM's are followed by white space.
         (format != Self::Pfm || bytes.get(magic.len()).is_some_and(u8::is_ascii_whitespace)).then_some(format)
+    }
+
+    /// Whether one file of this format can hold the frames of a sequence.
+    pub const fn moves(self) -> bool {
+        matches!(self, Self::Gif | Self::Apng)
     }
 
     /// The format that a file name's extension stands for, in any case.

@@ -11,6 +11,7 @@
 
 pub mod analysis;
 pub mod colour;
+mod components;
 pub mod composite;
 pub mod filters;
 pub mod reference;

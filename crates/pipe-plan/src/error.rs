@@ -25,9 +25,9 @@ pub enum PlanError {
     /// The plan does not fit the budget.
     #[error(
         "the plan needs {} at once, the budget is {}; the largest part is `{name}` with {}\n  next: give it more with --vram, shrink the image, or use options: (format: F16)",
-        mib(needed),
-        mib(budget),
-        mib(bytes)
+        human(needed),
+        human(budget),
+        human(bytes)
     )]
     Budget { needed: u64, budget: u64, alive: usize, name: String, bytes: u64 },
     /// A node refused to be lowered.
@@ -35,6 +35,7 @@ pub enum PlanError {
     Node { name: String, message: String },
 }
 
-fn mib(bytes: &u64) -> String {
-    format!("{:.1} MiB", *bytes as f64 / f64::from(1 << 20))
+fn human(bytes: &u64) -> String {
+    let (unit, name) = if *bytes < 1 << 20 { (10, "KiB") } else { (20, "MiB") };
+    format!("{:.1} {name}", *bytes as f64 / f64::from(1 << unit))
 }

@@ -69,13 +69,21 @@ struct Values {
     srgb: bool,
 }
 
-fn values(p: &Picture) -> Values {
-    let channels = p.channels.count();
+/// The values of a picture in so many channels: grey is spread over three, and what has no alpha is opaque.
+fn values(p: &Picture, channels: usize) -> Values {
+    let own = p.channels.count();
+    let place = |c: usize| match (own, c) {
+        _ if own == channels => Some(c),
+        (1 | 3, 3) => None,
+        (2, 3) => Some(1),
+        (1 | 2, _) => Some(0),
+        _ => Some(c),
+    };
     let mut data = Vec::with_capacity(p.width as usize * p.height as usize * channels);
     for y in 0..p.height {
         for x in 0..p.width {
             for c in 0..channels {
-                data.push(p.sample_at(x, y, c).unwrap_or(f32::NAN));
+                data.push(place(c).map_or(1.0, |c| p.sample_at(x, y, c).unwrap_or(f32::NAN)));
             }
         }
     }
@@ -92,12 +100,14 @@ pub fn compare_files(a: &str, b: &str, limit: f64) -> Result<Comparison, Failure
 
 /// Compares two pictures.
 pub fn compare(a: &Picture, b: &Picture, limit: f64) -> Result<Comparison, String> {
-    let (a, b) = (values(a), values(b));
+    let channels = match [a, b].map(|p| p.channels.count()) {
+        [one, other] if one == other => one,
+        counts if counts.contains(&2) || counts.contains(&4) => 4,
+        _ => 3,
+    };
+    let (a, b) = (values(a, channels), values(b, channels));
     if a.size != b.size {
         return Err(format!("one is {}x{}, the other {}x{}", a.size[0], a.size[1], b.size[0], b.size[1]));
-    }
-    if a.channels != b.channels {
-        return Err(format!("one has {} channels, the other {}", a.channels, b.channels));
     }
     let pixels = a.size[0] as usize * a.size[1] as usize;
     let mut map = vec![0.0_f32; pixels];

@@ -1,12 +1,15 @@
 //! Sequences: every frame through the same graph, decode, GPU and encode overlapping.
 //!
 //! One thread decodes the frames ahead, this one runs them, one encodes those that are done; at most two frames wait
-//! between them, so memory is bounded. The session keeps pipelines, memory and staging over all frames.
+//! between them, so memory is bounded. The session keeps pipelines, memory and staging over all frames. An output that is
+//! one file of a format that moves (APNG, GIF) holds all frames.
 
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::collections::HashMap;
+use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 use std::sync::mpsc::sync_channel;
 
 use pipe_io::sequence::{FrameRange, Pattern};
+use pipe_io::{Animation, Format, Target};
 
 use crate::Failure;
 use crate::project::Project;
@@ -47,6 +50,40 @@ fn at_frame(job: &Job, frame: u32) -> Result<Job, Failure> {
     Ok(job)
 }
 
+/// The outputs that hold all frames in one file.
+fn moving(job: &Job, sequence: &Sequence) -> Result<HashMap<Target, Animation>, Failure> {
+    let count = sequence.frames.into_iter().count() as u32;
+    let mut moving = HashMap::new();
+    for file in job.outputs.values() {
+        if Pattern::parse(file)?.is_some() {
+            continue;
+        }
+        match Target::parse(file) {
+            Ok(target) if target.format.moves() => {
+                if sequence.resume {
+                    return Err(Failure::Graph(format!(
+                        "{file} is written as a whole and cannot be resumed\n  next: run it without --resume"
+                    )));
+                }
+                if sequence.skip_bad && target.format == Format::Apng {
+                    return Err(Failure::Graph(format!(
+                        "{file} announces its frames and cannot skip any\n  next: write a .gif, or run it without --skip-bad-frames"
+                    )));
+                }
+                let animation = Animation::create(&target, count, job.rate, &job.write)?;
+                moving.insert(target, animation);
+            }
+            _ if count > 1 => {
+                return Err(Failure::Graph(format!(
+                    "every frame would be written to {file}\n  next: name a file for each frame with `####`, such as out.####.exr, or one for all: out.apng, out.gif"
+                )));
+            }
+            _ => {}
+        }
+    }
+    Ok(moving)
+}
+
 /// Runs every frame.
 pub fn run_sequence(
     session: &mut Session,
@@ -65,13 +102,10 @@ pub fn run_sequence(
             "a graph with Feedback cannot be resumed: each frame needs the one before\n  next: run it without --resume".into(),
         ));
     }
-    let outputs_vary = job.outputs.values().map(|f| Pattern::parse(f)).collect::<Result<Vec<_>, _>>()?;
-    if sequence.frames.into_iter().count() > 1 && outputs_vary.iter().any(Option::is_none) {
-        return Err(Failure::Graph(
-            "every frame would be written to the same file\n  next: name outputs with `####`, such as out.####.exr".into(),
-        ));
-    }
+    let mut moving = moving(job, sequence)?;
     let frames: Vec<u32> = sequence.frames.into_iter().collect();
+    let count = frames.len() as u32;
+    let skipped = &AtomicU32::new(0);
     let mut outcome = Outcome::default();
 
     std::thread::scope(|scope| {
@@ -95,9 +129,13 @@ pub fn run_sequence(
         let encoder = scope.spawn(move || -> Result<(u32, Option<Report>), Failure> {
             let (mut written, mut last) = (0, None);
             while let Ok((_, finished)) = finished_rx.recv() {
-                last = Some(finished.write()?);
+                last = Some(finished.write_into(&mut moving)?);
                 written += 1;
                 step();
+            }
+            // What has lost frames to a failure does not become a file.
+            if written + skipped.load(Ordering::Relaxed) == count {
+                moving.into_values().try_for_each(Animation::finish)?;
             }
             Ok((written, last))
         });
@@ -124,12 +162,12 @@ pub fn run_sequence(
                     }
                 }
                 Ok(None) => {
-                    outcome.skipped += 1;
+                    skipped.fetch_add(1, Ordering::Relaxed);
                     step();
                 }
                 Err(Failure::World(reason)) if sequence.skip_bad => {
                     say(&format!("warning: frame {frame} is skipped: {reason}"));
-                    outcome.skipped += 1;
+                    skipped.fetch_add(1, Ordering::Relaxed);
                     step();
                 }
                 Err(Failure::World(reason)) => {
@@ -149,5 +187,6 @@ pub fn run_sequence(
         outcome.last = last;
         result
     })?;
+    outcome.skipped = skipped.load(Ordering::Relaxed);
     Ok(outcome)
 }

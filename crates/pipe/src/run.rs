@@ -20,7 +20,7 @@ use pipe_graph::types::{EdgeKind, EdgeType, Element, ImageType, VolumeType};
 use pipe_io::mesh::Mesh;
 use pipe_io::table::Table;
 use pipe_io::volume::{Volume, VolumeHeader, Voxel};
-use pipe_io::{Channels, Metadata, Picture, ReadOptions, Source, Target, WriteOptions};
+use pipe_io::{Animation, Channels, Metadata, Picture, ReadOptions, Source, Target, WriteOptions};
 use pipe_plan::lower::{Rim, file_name, lower, readback_name};
 use pipe_plan::{Options, Plan};
 
@@ -67,6 +67,8 @@ pub struct Job {
     pub force: bool,
     /// The frame, as `frame` in expressions.
     pub frame: f64,
+    /// Frames a second: `time` in expressions, and the speed of moving pictures.
+    pub rate: f64,
     /// Frames that this session ran before, for `Feedback`.
     pub frames_before: u32,
 }
@@ -89,6 +91,7 @@ impl Job {
             profile: false,
             force: false,
             frame: 1.0,
+            rate: 24.0,
             frames_before: 0,
         }
     }
@@ -219,9 +222,18 @@ pub struct Finished {
 
 impl Finished {
     /// Writes every output. Nothing was written before.
-    pub fn write(mut self) -> Result<Report, Failure> {
+    pub fn write(self) -> Result<Report, Failure> {
+        self.write_into(&mut HashMap::new())
+    }
+
+    /// Writes every output: pictures whose target is one of these moving pictures become its next frame.
+    pub fn write_into(mut self, moving: &mut HashMap<Target, Animation>) -> Result<Report, Failure> {
         let started = Instant::now();
         for (target, picture) in &self.images {
+            if let Some(animation) = moving.get_mut(target) {
+                animation.push(picture)?;
+                continue;
+            }
             let options = WriteOptions { channels: Some(picture.channels), ..self.write.clone() };
             pipe_io::write(target, picture, &options)?;
         }
@@ -388,7 +400,7 @@ pub fn request(job: &Job, inputs: &Inputs) -> Request {
         assumed: None,
         settings: job.settings.clone(),
         frame: job.frame,
-        time: (job.frame - 1.0) / 24.0,
+        time: (job.frame - 1.0) / job.rate,
     }
 }
 

@@ -26,7 +26,7 @@ pub(super) struct Draft {
 /// What a draft will become.
 pub(super) enum What {
     Node(Box<dyn Node>),
-    Subgraph { file: Spanned<String>, inputs: Vec<(String, usize)>, params: IndexMap<String, Tree> },
+    Subgraph { file: Spanned<String>, inputs: Vec<(String, usize)>, params: IndexMap<String, (Span, Tree)> },
     Iterate(Box<Body>),
     Feedback { next: Spanned<String>, delay: u32 },
 }
@@ -38,8 +38,8 @@ pub(super) struct Body {
     pub(super) states: Vec<(String, usize)>,
     pub(super) calls: Vec<Call>,
     pub(super) next: Vec<(Spanned<String>, Spanned<String>)>,
-    /// Where `until` was written.
-    pub(super) until: Option<Span>,
+    /// Where the parts of `until` were written.
+    pub(super) until: Option<Tree>,
 }
 
 /// The edge behind a port that was read for a map of ports.
@@ -67,7 +67,7 @@ impl Resolver<'_> {
             "Iterate" => self.draft_iterate(&mut call, frame)?,
             "Feedback" => self.draft_feedback(&mut call, frame)?,
             _ => {
-                let built = build_node(kind, &call.fields, call.span, frame.env);
+                let built = build_node(kind, &call.fields, call.kind.span, frame.env);
                 self.diagnostics.extend(built.diagnostics);
                 (What::Node(built.node?), built.edges)
             }
@@ -104,7 +104,7 @@ impl Resolver<'_> {
                 };
                 self.diagnostics.extend(mistakes);
                 if let Some(number) = number {
-                    params.insert(name.value, Tree { span: value.span, value: Syntax::Float(number) });
+                    params.insert(name.value, (name.span, Tree { span: value.span, value: Syntax::Float(number) }));
                 }
             }
         }
@@ -113,7 +113,7 @@ impl Resolver<'_> {
         self.diagnostics.extend(mistakes);
         let fields = fields?;
         let Some(span) = file else {
-            self.diagnostics.push(Diagnostic::error(call.span, "a Subgraph needs a file").label("expected `file: \"name.ron\"`"));
+            self.diagnostics.push(Diagnostic::error(call.kind.span, "a Subgraph needs a file").label("expected `file: \"name.ron\"`"));
             return None;
         };
         let inputs = edge_of(&fields.inputs);
@@ -122,11 +122,12 @@ impl Resolver<'_> {
 
     fn draft_iterate(&mut self, call: &mut Call, frame: &Frame<'_>) -> Option<(What, Vec<EdgeUse>)> {
         let (body, next) = (take(&mut call.fields, "body"), take(&mut call.fields, "next"));
-        let until = call.fields.iter().find(|(key, _)| key.value == "until").map(|(_, tree)| tree.span);
+        let until = call.fields.iter().find(|(key, _)| key.value == "until").map(|(_, tree)| tree.clone());
         let (fields, edges, mistakes) = self.structure_fields::<Iterate>(call, frame);
         self.diagnostics.extend(mistakes);
         let mut missing = |what: &str, expected: &str| {
-            self.diagnostics.push(Diagnostic::error(call.span, format!("Iterate has no `{what}`")).label(format!("expected `{expected}`")));
+            self.diagnostics
+                .push(Diagnostic::error(call.kind.span, format!("Iterate has no `{what}`")).label(format!("expected `{expected}`")));
         };
         if body.is_none() {
             missing("body", "body: {nodes…}");
@@ -138,9 +139,18 @@ impl Resolver<'_> {
         if fields.state.is_empty() {
             missing("state", "state: {\"u\": \"seed\"}");
         }
-        if fields.count.is_none() == fields.until.is_none() {
-            self.diagnostics
-                .push(Diagnostic::error(call.span, "Iterate takes either `count` or `until`").label("expected exactly one of the two"));
+        let mut ends = |place: Span, what: &str, label: &str| self.diagnostics.push(Diagnostic::error(place, what).label(label));
+        match (&fields.count, &fields.until) {
+            (Some(_), Some(_)) => ends(
+                until.as_ref().map_or(call.kind.span, |t| t.span),
+                "Iterate takes either `count` or `until`",
+                "`count` is given already; remove one of them",
+            ),
+            (None, None) => ends(call.kind.span, "this Iterate never ends", "expected `count: 100` or `until: Below(…)`"),
+            _ => {}
+        }
+        if fields.state.is_empty() {
+            return None;
         }
         let (body, next) = (body?.1, next?.1);
         let mut reader = Reader { registry: self.registry, diagnostics: self.diagnostics };
@@ -149,7 +159,8 @@ impl Resolver<'_> {
         let states = edge_of(&fields.state);
         for (name, _) in &next {
             if !fields.state.contains_key(&name.value) {
-                let d = Diagnostic::error(name.span, format!("`{}` is no state of this Iterate", name.value));
+                let d = Diagnostic::error(name.span, format!("`{}` is no state of this Iterate", name.value))
+                    .label(format!("its states are {}", fields.state.keys().map(String::as_str).collect::<Vec<_>>().join(", ")));
                 self.diagnostics.push(with_nearest(d, &name.value, fields.state.keys().map(String::as_str)));
             }
         }
@@ -163,18 +174,18 @@ impl Resolver<'_> {
         let fields = fields?;
         if self.bodies > 0 {
             self.diagnostics.push(
-                Diagnostic::error(call.span, "Feedback cannot stand in an Iterate body")
+                Diagnostic::error(call.kind.span, "Feedback cannot stand in an Iterate body")
                     .label("it passes values between frames")
                     .hint("a `state` passes values between iterations"),
             );
             return None;
         }
         let Some(next) = next else {
-            self.diagnostics.push(Diagnostic::error(call.span, "Feedback has no `next`").label("expected `next: \"node\"`"));
+            self.diagnostics.push(Diagnostic::error(call.kind.span, "Feedback has no `next`").label("expected `next: \"node\"`"));
             return None;
         };
         if !fields.init.is_bound() {
-            self.diagnostics.push(Diagnostic::error(call.span, "missing input `init`").label("expected `init: \"NAME\"`"));
+            self.diagnostics.push(Diagnostic::error(call.kind.span, "missing input `init`").label("expected `init: \"NAME\"`"));
             return None;
         }
         Some((What::Feedback { next: Spanned { span: next, value: fields.next }, delay: fields.delay }, edges))
@@ -185,7 +196,7 @@ impl Resolver<'_> {
         call: &Call,
         frame: &Frame<'_>,
     ) -> (Option<T>, Vec<EdgeUse>, Vec<Diagnostic>) {
-        let tree = Tree { span: call.span, value: Syntax::Struct(Some(call.kind.clone()), call.fields.clone()) };
+        let tree = Tree { span: call.kind.span, value: Syntax::Struct(Some(call.kind.clone()), call.fields.clone()) };
         from_tree::<T>(&tree, frame.env)
     }
 }

@@ -22,11 +22,11 @@ use petgraph::graph::DiGraph;
 
 use crate::de::from_tree;
 use crate::diagnostic::{Diagnostic, Diagnostics, Sources};
-use crate::document::{Document, Parameter, ParameterType, parse, with_nearest};
+use crate::document::{Document, Field, Parameter, ParameterType, parse, with_nearest};
 use crate::expr::Env;
 use crate::graph::{Graph, Instance, Options, ValueRef, Wire, Work};
 use crate::node::{Loader, Output, Registry};
-use crate::span::{Span, Tree};
+use crate::span::{Span, Syntax, Tree};
 use crate::syntax::parse_tree;
 use crate::types::{EdgeKind, EdgeType, Element};
 
@@ -89,8 +89,8 @@ fn read_settings(settings: &[(String, String)], sources: &mut Sources) -> Vec<Se
     let read = |(name, text): &(String, String)| {
         let file = sources.add(Path::new("--set"), text);
         // A value that is no RON is taken as plain text, so that the shell needs no second pair of quotes.
-        let value = parse_tree(text, file)
-            .unwrap_or_else(|_| Tree { span: Span::new(file, 0..text.len()), value: crate::span::Syntax::Text(text.clone()) });
+        let value =
+            parse_tree(text, file).unwrap_or_else(|_| Tree { span: Span::new(file, 0..text.len()), value: Syntax::Text(text.clone()) });
         Setting { name: name.clone(), value, used: false }
     };
     settings.iter().map(read).collect()
@@ -115,6 +115,14 @@ fn normal(path: &Path) -> PathBuf {
 fn spacing_names(env: &mut Env, name: &str, spacing: [f32; 3]) {
     for (field, distance) in ["dx", "dy", "dz"].into_iter().zip(spacing) {
         env.set(&format!("{name}.{field}"), f64::from(distance));
+    }
+}
+
+/// The field of a struct, with its value.
+fn field_of<'t>(tree: &'t Tree, name: &str) -> Option<&'t Field> {
+    match &tree.value {
+        Syntax::Struct(_, fields) => fields.iter().find(|(key, _)| key.value == name),
+        _ => None,
     }
 }
 
@@ -176,7 +184,7 @@ impl Resolver<'_> {
         }
         for name in self.request.inputs.keys() {
             if !inputs.contains_key(name) {
-                let span = document.inputs.first().map_or(Span::new(document.file, 0..0), |i| i.name.span);
+                let span = document.inputs.first().map_or(document.head, |i| i.name.span);
                 let d = Diagnostic::error(span, format!("the graph has no input `{name}`"));
                 self.diagnostics.push(with_nearest(d, name, inputs.keys().map(String::as_str)));
             }
@@ -195,12 +203,12 @@ impl Resolver<'_> {
             }
         }
         self.check_feedbacks();
-        self.check_settings();
+        self.check_settings(document);
         let dag = std::mem::take(&mut self.level().dag);
         let sinks = usage::sinks(&dag);
-        if outputs.is_empty() && document.outputs.is_empty() && sinks.is_empty() {
+        if document.outputs.is_empty() && sinks.is_empty() && !self.means_to_read_back(document) {
             self.diagnostics.push(
-                Diagnostic::error(Span::new(document.file, 0..5), "nothing leaves the graph")
+                Diagnostic::error(document.head, "nothing leaves the graph")
                     .label("expected `outputs: {\"out\": \"node\"}`")
                     .hint("or add a Readback node"),
             );
@@ -215,6 +223,14 @@ impl Resolver<'_> {
         outputs.sort_unstable_keys();
         inputs.sort_unstable_keys();
         Some(Graph { name: document.name.clone(), dag, order, inputs, outputs })
+    }
+
+    /// Whether a node acts by itself, right or wrong.
+    fn means_to_read_back(&self, document: &Document) -> bool {
+        document.nodes.iter().any(|call| {
+            let reads = call.options.as_ref().is_some_and(|options| field_of(options, "readback").is_some());
+            reads || matches!(call.kind.value.as_str(), "" | "Readback") || self.registry.get(&call.kind.value).is_none()
+        })
     }
 
     /// The graph under construction.
@@ -274,7 +290,7 @@ impl Resolver<'_> {
 
     fn param_value(&mut self, parameter: &Parameter, tree: &Tree, env: &Env) -> f64 {
         let name = &parameter.name.value;
-        let value = if parameter.ty == ParameterType::Bool {
+        let mut value = if parameter.ty == ParameterType::Bool {
             let (value, _, mistakes) = from_tree::<bool>(tree, env);
             self.diagnostics.extend(mistakes);
             return f64::from(u8::from(value.unwrap_or_default()));
@@ -290,6 +306,7 @@ impl Resolver<'_> {
         let integral = matches!(parameter.ty, ParameterType::I32 | ParameterType::U32);
         if integral && value.fract() != 0.0 {
             self.diagnostics.push(Diagnostic::error(tree.span, format!("`{name}` is {value}")).label("expected a whole number"));
+            value = value.round();
         }
         let least = if parameter.ty == ParameterType::U32 { Some(0.0) } else { None };
         let (min, max) = (parameter.min.or(least), parameter.max);
@@ -302,6 +319,8 @@ impl Resolver<'_> {
             };
             self.diagnostics
                 .push(Diagnostic::error(tree.span, format!("`{name}` is {value}, out of its range")).label(format!("expected {range}")));
+            // With a value in its range nothing else is wrong because of it.
+            value = min.unwrap_or(value).max(max.map_or(value, |m| value.min(m)));
         }
         value
     }
@@ -315,7 +334,10 @@ impl Resolver<'_> {
         let read = match self.loader.text(path) {
             Ok(text) => parse(path, &text, self.registry, self.sources, self.diagnostics).map(Arc::new),
             Err(reason) => {
-                self.diagnostics.push(Diagnostic::error(place, format!("cannot read subgraph: {reason}")));
+                self.diagnostics.push(
+                    Diagnostic::error(place, format!("cannot read the subgraph: {reason}"))
+                        .label("expected the path of a graph, relative to this file"),
+                );
                 None
             }
         };
@@ -338,8 +360,9 @@ impl Resolver<'_> {
         }
     }
 
-    fn check_settings(&mut self) {
-        let known: Vec<String> = self.level().dag.node_weights().map(|i| i.name.clone()).collect();
+    fn check_settings(&mut self, document: &Document) {
+        let nodes = self.level().dag.node_weights().map(|i| i.name.clone());
+        let known: Vec<String> = document.params.iter().map(|p| p.name.value.clone()).chain(nodes).collect();
         for setting in std::mem::take(&mut self.settings) {
             if !setting.used {
                 let d = Diagnostic::error(setting.value.span, format!("--set {}: there is no such parameter or node", setting.name));

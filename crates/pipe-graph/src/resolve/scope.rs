@@ -10,7 +10,7 @@ use petgraph::algo::tarjan_scc;
 use petgraph::graph::{DiGraph, NodeIndex};
 
 use super::draft::{Body, Draft, What};
-use super::{Level, MOST_NODES, Resolver, article, normal};
+use super::{Level, MOST_NODES, Resolver, article, field_of, normal};
 use crate::de::EdgeUse;
 use crate::diagnostic::Diagnostic;
 use crate::document::{Call, with_nearest};
@@ -44,6 +44,15 @@ enum Entity {
 #[derive(Default)]
 pub(super) struct Scope {
     entities: IndexMap<String, Entity>,
+    /// Names of all nodes, of those too that are not settled yet.
+    calls: Vec<String>,
+}
+
+impl Scope {
+    /// Every name that can be meant.
+    fn names(&self) -> impl Iterator<Item = &str> {
+        self.entities.keys().chain(&self.calls).map(String::as_str)
+    }
 }
 
 impl Resolver<'_> {
@@ -55,6 +64,7 @@ impl Resolver<'_> {
         }
         let mut calls: Vec<&Call> = calls.iter().collect();
         calls.sort_by(|a, b| a.name.value.cmp(&b.name.value));
+        scope.calls = calls.iter().map(|c| c.name.value.clone()).collect();
         let mut drafts = Vec::new();
         for call in calls {
             match self.draft(call, frame) {
@@ -210,11 +220,15 @@ impl Resolver<'_> {
                 None
             }
             None => {
-                let mut names: Vec<&str> = scope.entities.keys().map(String::as_str).collect();
+                let mut names: Vec<&str> = scope.names().collect();
                 let mut outer = frame.outer;
                 while let Some((scope, frame)) = outer {
-                    names.extend(scope.entities.keys().map(String::as_str));
+                    names.extend(scope.names());
                     outer = frame.outer;
+                }
+                // A node whose name cannot be one is told where it is defined.
+                if names.contains(&text) {
+                    return None;
                 }
                 let d = Diagnostic::error(span, format!("there is no node or input `{name}`")).label("unknown name");
                 self.diagnostics.push(with_nearest(d, name, names));
@@ -341,13 +355,13 @@ impl Resolver<'_> {
             if outputs.is_empty() {
                 return Entity::Node(Some(Vec::new()));
             }
-            self.note(site, Mistake::in_field("options", "a node without inputs cannot be bypassed"), false);
+            self.note(site, Mistake::in_field("options.when", "cannot be bypassed: it has no input that could pass through"), false);
             return Entity::Node(None);
         };
         let ty = self.ty(*first);
         if ty.kind() != out.ty.kind() {
             let (got, want) = (article(ty.kind()), article(out.ty.kind()));
-            self.note(site, Mistake::in_field("options", format!("cannot be bypassed: its input is {got}, its output {want}")), false);
+            self.note(site, Mistake::in_field("options.when", format!("cannot be bypassed: its input is {got}, its output {want}")), false);
             return Entity::Node(None);
         }
         Entity::Node(Some(vec![(out.name.clone(), *first)]))
@@ -356,16 +370,21 @@ impl Resolver<'_> {
     fn check_repeat(&mut self, site: &Settling, types: &[EdgeType], outputs: &[Output]) -> bool {
         let mistake = match (site.options.repeat, types.first(), outputs.first()) {
             (None | Some(1), ..) => return true,
-            (Some(0), ..) => "`repeat` counts how often the node runs; expected at least 1 (`when: false` bypasses)".to_owned(),
+            (Some(0), ..) => {
+                let mistake =
+                    Mistake::in_field("options.repeat", "runs 0 times; expected at least 1").hint("`when: false` bypasses a node");
+                self.note(site, mistake, false);
+                return false;
+            }
             (Some(_), Some(input), Some(output)) => {
                 if same_shape(input, &output.ty) {
                     return true;
                 }
                 format!("cannot repeat: its first input is {input}, its output is {}", output.ty)
             }
-            (Some(_), ..) => "cannot repeat a node without an input and an output".to_owned(),
+            (Some(_), ..) => "cannot repeat: it has no input that its output could go to".to_owned(),
         };
-        self.note(site, Mistake::in_field("options", mistake), false);
+        self.note(site, Mistake::in_field("options.repeat", mistake), false);
         false
     }
 
@@ -374,7 +393,7 @@ impl Resolver<'_> {
         site: &Settling,
         file: &Spanned<String>,
         bound: &[(String, usize)],
-        params: &IndexMap<String, Tree>,
+        params: &IndexMap<String, (Span, Tree)>,
         frame: &Frame<'_>,
     ) -> Option<Vec<(String, ValueRef)>> {
         let path = frame.folder.join(&file.value);
@@ -397,7 +416,7 @@ impl Resolver<'_> {
             let name = &input.name.value;
             let Some((_, edge)) = bound.iter().find(|(n, _)| n == name) else {
                 self.diagnostics.push(
-                    Diagnostic::error(site.call.span, format!("missing input `{name}` of {}", file.value))
+                    Diagnostic::error(site.call.kind.span, format!("missing input `{name}` of {}", file.value))
                         .label(format!("expected `inputs: {{\"{name}\": \"NODE\"}}`")),
                 );
                 fits = false;
@@ -411,14 +430,18 @@ impl Resolver<'_> {
         }
         for (name, edge) in bound {
             if !names.contains_key(name) && !document.inputs.iter().any(|i| i.name.value == *name) {
-                let d = Diagnostic::error(site.edges[*edge].span, format!("{} has no input `{name}`", file.value));
+                let inputs = site.call.fields.iter().find(|(key, _)| key.value == "inputs");
+                let span = inputs.and_then(|(_, tree)| key_span(tree, name)).unwrap_or(site.edges[*edge].span);
+                let known = document.inputs.iter().map(|i| i.name.value.as_str());
+                let d = Diagnostic::error(span, format!("{} has no input `{name}`", file.value)).label(list_of("inputs", known));
                 self.diagnostics.push(with_nearest(d, name, document.inputs.iter().map(|i| i.name.value.as_str())));
                 fits = false;
             }
         }
-        for (name, value) in params {
+        for (name, (span, _)) in params {
             if !document.params.iter().any(|p| p.name.value == *name) {
-                let d = Diagnostic::error(value.span, format!("{} has no parameter `{name}`", file.value));
+                let known = document.params.iter().map(|p| p.name.value.as_str());
+                let d = Diagnostic::error(*span, format!("{} has no parameter `{name}`", file.value)).label(list_of("parameters", known));
                 self.diagnostics.push(with_nearest(d, name, document.params.iter().map(|p| p.name.value.as_str())));
             }
         }
@@ -426,7 +449,8 @@ impl Resolver<'_> {
             return None;
         }
         let prefix = format!("{}{}/", frame.prefix, site.call.name.value);
-        self.params(&document, params, &prefix, &mut env);
+        let given = params.iter().map(|(name, (_, value))| (name.clone(), value.clone())).collect();
+        self.params(&document, &given, &prefix, &mut env);
         let folder = path.parent().unwrap_or(Path::new("")).to_owned();
         self.chain.push(normal(&path));
         let inner = Frame { prefix: &prefix, env: &env, folder: &folder, outer: None };
@@ -469,7 +493,7 @@ impl Resolver<'_> {
         for (name, edge) in &parts.states {
             let Some((_, text)) = parts.next.iter().find(|(n, _)| n.value == *name) else {
                 self.diagnostics.push(
-                    Diagnostic::error(site.call.span, format!("state `{name}` has no `next`"))
+                    Diagnostic::error(site.call.kind.span, format!("state `{name}` has no `next`"))
                         .label(format!("expected `next: {{\"{name}\": \"NODE\"}}`")),
                 );
                 continue;
@@ -504,9 +528,13 @@ impl Resolver<'_> {
         let Some(Until::Below { value, limit, every }) = &parts.fields.until else {
             return parts.fields.count.map(Times::Fixed);
         };
-        let span = parts.until.unwrap_or(site.call.span);
+        let place = |name: &str| {
+            let until = parts.until.as_ref();
+            until.map_or(site.call.kind.span, |tree| field_of(tree, name).map_or(tree.span, |(_, value)| value.span))
+        };
+        let span = place("value");
         if *every == 0 {
-            self.diagnostics.push(Diagnostic::error(span, "`every` is 0").label("expected at least 1"));
+            self.diagnostics.push(Diagnostic::error(place("every"), "`every` is 0").label("expected at least 1"));
             return None;
         }
         let found = self.lookup(body, inner, value, span)?;
@@ -541,15 +569,19 @@ impl Resolver<'_> {
     fn note(&mut self, site: &Settling, mistake: Mistake, warning: bool) {
         let field = mistake.field.as_deref().unwrap_or_default();
         let head = field.split('.').next().unwrap_or_default();
-        let span = if field == "options" {
-            site.call.options.as_ref().map(|t| t.span)
+        let span = if head == "options" {
+            let options = site.call.options.as_ref();
+            let part = |tree| field_of(tree, field.trim_start_matches("options.")).map(|(_, value)| value.span);
+            options.map(|tree| part(tree).unwrap_or(tree.span))
         } else {
             let edge = site.edges.iter().find(|e| e.field == field).map(|e| e.span);
             edge.or_else(|| site.call.fields.iter().find(|(key, _)| key.value == head).map(|(_, tree)| tree.span))
         };
-        let span = span.unwrap_or(site.call.span);
-        let message = if mistake.field.is_some() && field != "options" {
-            format!("`{field}` {}", mistake.message)
+        let span = span.unwrap_or(site.call.kind.span);
+        let message = if mistake.field.is_some() && head != "options" {
+            // Some say the field's name themselves.
+            let rest = mistake.message.strip_prefix(field).filter(|rest| rest.starts_with(' '));
+            format!("`{field}` {}", rest.map_or(mistake.message.as_str(), str::trim_start))
         } else {
             format!("`{}` {}", site.call.name.value, mistake.message)
         };
@@ -602,6 +634,18 @@ fn impossible(output: &Output) -> Option<Mistake> {
     })
 }
 
+/// Where a map has this key.
+fn key_span(tree: &Tree, name: &str) -> Option<Span> {
+    let Syntax::Map(entries) = &tree.value else { return None };
+    entries.iter().map(|(key, _)| key).find(|key| matches!(&key.value, Syntax::Text(text) if text == name)).map(|key| key.span)
+}
+
+/// `its inputs are a, b`
+fn list_of<'n>(what: &str, names: impl Iterator<Item = &'n str>) -> String {
+    let names: Vec<_> = names.collect();
+    if names.is_empty() { format!("it has no {what}") } else { format!("its {what} are {}", names.join(", ")) }
+}
+
 /// Texts in an `Iterate` body that may name something outside it.
 fn captured_texts<'t>(body: &'t Body, texts: &mut Vec<(&'t str, Span)>) {
     let own = |text: &str| {
@@ -613,6 +657,10 @@ fn captured_texts<'t>(body: &'t Body, texts: &mut Vec<(&'t str, Span)>) {
         for (_, tree) in &call.fields {
             walk(tree, &mut found);
         }
+    }
+    let until = body.until.as_ref().and_then(|tree| field_of(tree, "value"));
+    if let Some((_, tree)) = until {
+        walk(tree, &mut found);
     }
     found.extend(body.next.iter().map(|(_, edge)| (edge.value.as_str(), edge.span)));
     texts.extend(found.into_iter().filter(|(text, _)| !own(text)));

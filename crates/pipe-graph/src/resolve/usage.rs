@@ -40,7 +40,7 @@ pub(super) fn warn_unused(
         if written && !used[node.index()] && instance.span.file == file {
             diagnostics.push(
                 Diagnostic::warning(instance.span, format!("`{}` is not used", instance.name))
-                    .label("nothing reads this node")
+                    .label("its result goes nowhere")
                     .hint("remove it, or name it in `outputs`"),
             );
         }

@@ -59,16 +59,22 @@ pub(crate) struct Binning {
 /// Most bins that are counted in workgroup memory: 16 KiB.
 const PRIVATE: u32 = 4096;
 
+/// Lanes that count in columns of their own.
+const LANES: u32 = 16;
+
 /// How many pixels fall in each bin: a table of u32.
 pub(crate) fn count(cx: &mut Lowering<'_>, suffix: &str, image: ResourceId, binning: &Binning) -> ResourceId {
     let size = cx.image_of(image).size;
-    let walk = match cx.limits().profile {
-        Profile::Gpu => Walk::tiles(size, [16, 16], [64, 64]),
-        Profile::Cpu => Walk::tiles(size, [64, 1], [256, 64]),
-    };
     let counts = cx.intermediate(suffix, Shape::uints(binning.bins));
+    // A lane of a CPU counts in its own column while the columns fit.
+    let columns = cx.limits().profile == Profile::Cpu && binning.bins * LANES <= PRIVATE;
+    let (walk, shader) = match cx.limits().profile {
+        Profile::Gpu => (Walk::tiles(size, [16, 16], [64, 64]), shader!("analysis/histogram")),
+        Profile::Cpu if columns => (Walk::tiles(size, [LANES, 1], [256, 64]), shader!("analysis/histogram_lanes")),
+        Profile::Cpu => (Walk::tiles(size, [64, 1], [256, 64]), shader!("analysis/histogram")),
+    };
     let pass = cx
-        .pass(suffix, shader!("analysis/histogram"))
+        .pass(suffix, shader)
         .entry(Entry::Kernel)
         .read("image", image, Reach::Whole)
         .write_as("counts", counts, Access::Atomic, None)
@@ -99,10 +105,10 @@ impl Binning {
         counts
     }
 
-    /// The bin of a value.
+    /// The bin of a value; none for NaN and infinity.
     pub(crate) fn bin(&self, v: f64, low: f64, high: f64) -> Option<usize> {
         let last = self.bins as usize - 1;
-        if v.is_nan() || (self.outside == Outside::Ignore && !(low..=high).contains(&v)) {
+        if !v.is_finite() || (self.outside == Outside::Ignore && !(low..=high).contains(&v)) {
             return None;
         }
         // The cast saturates: below the first bin is 0.
@@ -130,7 +136,7 @@ mod tests {
     fn bins_are_half_open_but_the_last() {
         let mut binning = Binning { bins: 4, low: Value::F32(0.0), high: Value::F32(1.0), channel: Channel::R, outside: Outside::Clamp };
         let bins = |b: &Binning| [-0.1, 0.0, 0.2499, 0.25, 0.75, 1.0, 1.5, f64::INFINITY, f64::NAN].map(|v| b.bin(v, 0.0, 1.0));
-        assert_eq!(bins(&binning), [Some(0), Some(0), Some(0), Some(1), Some(3), Some(3), Some(3), Some(3), None]);
+        assert_eq!(bins(&binning), [Some(0), Some(0), Some(0), Some(1), Some(3), Some(3), Some(3), None, None]);
         binning.outside = Outside::Ignore;
         assert_eq!(bins(&binning), [None, Some(0), Some(0), Some(1), Some(3), Some(3), None, None, None]);
     }

@@ -120,7 +120,7 @@ impl Node for Clahe {
         vec![Tensor::Image(Raster::from_fn(image.size, image.channels, |x, y| {
             let c = image.at(x, y);
             let luminance = grey(c);
-            if luminance.is_nan() {
+            if !luminance.is_finite() {
                 return c;
             }
             // The place among the centres of the tiles, and the two nearest tiles along an axis.
@@ -157,7 +157,7 @@ impl Clahe {
     fn curve_reference(&self, values: &[f64]) -> Vec<f64> {
         let bins = self.bins as usize;
         let mut counts = vec![0.0; bins];
-        for v in values.iter().filter(|v| !v.is_nan()) {
+        for v in values.iter().filter(|v| v.is_finite()) {
             counts[(self.position(*v) as usize).min(bins - 1)] += 1.0;
         }
         let area: f64 = counts.iter().sum();

@@ -26,8 +26,8 @@ pub(crate) struct Histogram {
     /// `Atomic` counts with atomic additions in a compute pass. `Blend` draws one point for each pixel with additive
     /// blending, as the graphics pipeline has always been able to. Both give the same counts.
     method: Method,
-    /// What becomes of values outside the range: `Clamp` counts them in the first or last bin (infinite ones too),
-    /// `Ignore` leaves them out.
+    /// What becomes of values outside the range: `Clamp` counts them in the first or last bin,
+    /// `Ignore` leaves them out. NaN and infinity are never counted; `Stats` says how many there are.
     outside: Outside,
 }
 

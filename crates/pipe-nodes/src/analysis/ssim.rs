@@ -16,12 +16,18 @@ const RADIUS: u32 = 5;
 pub(crate) fn lower(cx: &mut Lowering<'_>, a: ResourceId, b: ResourceId, out: ResourceId, peak: f32) {
     let size = cx.image_of(out).size;
     let weights = cx.floats("weights", &weights().map(|w| w as f32));
+    let luminances = cx.intermediate("luminances", Shape::image(size, 2));
+    cx.pass("luminances", shader!("analysis/ssim_luminance"))
+        .entry(Entry::Point)
+        .read("a", a, Reach::Point)
+        .read("b", b, Reach::Point)
+        .write("out", luminances)
+        .add();
     let moments = cx.intermediate("moments", Shape::image(size, 4));
     let products = cx.intermediate("products", Shape::image(size, 1));
     cx.pass("rows", shader!("analysis/ssim_rows"))
         .entry(Entry::Each)
-        .read("a", a, Reach::Around(RADIUS, 0))
-        .read("b", b, Reach::Around(RADIUS, 0))
+        .read("luminances", luminances, Reach::Around(RADIUS, 0))
         .read("weights", weights, Reach::Whole)
         .write("moments", moments)
         .write("products", products)

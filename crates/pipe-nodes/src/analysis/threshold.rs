@@ -91,12 +91,12 @@ fn otsu(cx: &mut Lowering<'_>, image: ResourceId) -> ResourceId {
         .read("image", image, Reach::Point)
         .write("out", luminance)
         .add();
-    let extent = reduction::extent(cx, "extent", luminance, View::Luminance);
+    let extent = reduction::extent(cx, "extent", luminance, View::Channels);
     let binning = Binning {
         bins: BINS,
         low: Value::Driven(extent.min),
         high: Value::Driven(extent.max),
-        channel: Channel::Luminance,
+        channel: Channel::R,
         outside: Outside::Ignore,
     };
     let counts = bins::count(cx, "histogram", luminance, &binning);

@@ -3,28 +3,30 @@
 use pipe_graph::prelude::*;
 use smart_default::SmartDefault;
 
-use crate::colour::point::{map_rgb, point, same};
+use crate::colour::point::{map_tinted, point, tinted};
+use crate::components::Rgb;
 use crate::shader;
 
-/// The ASC colour decision list: out = clamp(in·slope + offset)^power, then saturation about Rec.709 luminance.
+/// The ASC colour decision list: out = max(in·slope + offset, 0)^power, then saturation about Rec.709 luminance.
 ///
-/// Values below 0 are clamped before the power, as ASC CDL 1.2 says; values above 1 are kept. Alpha is kept.
+/// Values below 0 are clamped before the power, as ASC CDL 1.2 says; values above 1 are kept, since images are
+/// scene-referred. Alpha is kept. A 1-channel image becomes colour where channels are treated differently.
 #[derive(Debug, SmartDefault, Serialize, Deserialize, JsonSchema)]
 #[serde(default)]
 pub(super) struct Cdl {
     /// The image.
     image: In<Image>,
-    /// Factor.
-    #[default([1.0, 1.0, 1.0])]
-    #[schemars(range(min = 0.0))]
-    slope: [f32; 3],
+    /// Factor: a number, or (r, g, b).
+    #[default(Rgb::grey(1.0))]
+    #[schemars(extend("minimum" = 0.0))]
+    slope: Rgb,
     /// Added.
-    #[default([0.0, 0.0, 0.0])]
-    offset: [f32; 3],
+    #[default(Rgb::grey(0.0))]
+    offset: Rgb,
     /// Exponent.
-    #[default([1.0, 1.0, 1.0])]
-    #[schemars(range(min = 0.01, max = 100.0))]
-    power: [f32; 3],
+    #[default(Rgb::grey(1.0))]
+    #[schemars(extend("minimum" = 0.01, "maximum" = 100.0))]
+    power: Rgb,
     /// 0 is grey, 1 leaves colour as it is.
     #[default = 1.0]
     #[schemars(range(min = 0.0))]
@@ -37,29 +39,38 @@ pub(super) const KIND: Kind = Kind::of::<Cdl>(
     &[
         r#"Cdl(image: "in", slope: (1.1, 1.0, 0.9), offset: (0.01, 0.0, -0.01), power: (1.2, 1.0, 0.8), saturation: 0.8)"#,
         r#"Cdl(image: "in")"#,
+        r#"Cdl(image: "grey", slope: (1.2, 1.0, 0.7), saturation: 1.5)"#,
+        r#"Cdl(image: "grey", power: 0.5)"#,
     ],
 )
-.tolerance(1e-5, 2e-5);
+.tolerance(2e-6, 2e-5);
+
+impl Cdl {
+    fn tints(&self) -> bool {
+        ![self.slope, self.offset, self.power].iter().all(Rgb::is_grey)
+    }
+}
 
 impl Node for Cdl {
     fn outputs(&self, inputs: &mut Inputs<'_>) -> Result<Vec<Output>, Mistake> {
-        same(inputs, &self.image)
+        tinted(inputs, &self.image, self.tints())
     }
 
     fn lower(&self, cx: &mut Lowering<'_>) -> Result<(), Mistake> {
         point(cx, &self.image, shader!("colour/cdl"))
-            .param("slope", self.slope)
-            .param("offset", self.offset)
-            .param("power", self.power)
+            .param("slope", self.slope.0)
+            .param("offset", self.offset.0)
+            .param("power", self.power.0)
             .param("saturation", self.saturation)
             .add();
         Ok(())
     }
 
     fn reference(&self, cx: &Reference<'_>) -> Vec<Tensor> {
-        map_rgb(cx, &self.image, |c| {
+        map_tinted(cx, &self.image, self.tints(), |c| {
             let p: [f64; 3] = std::array::from_fn(|i| {
-                (c[i] * f64::from(self.slope[i]) + f64::from(self.offset[i])).max(0.0).powf(f64::from(self.power[i]))
+                let v = c[i] * self.slope.at(i) + self.offset.at(i);
+                if v.is_nan() { v } else { v.max(0.0).powf(self.power.at(i)) }
             });
             let y = luminance([p[0], p[1], p[2], 1.0]);
             p.map(|v| y + f64::from(self.saturation) * (v - y))

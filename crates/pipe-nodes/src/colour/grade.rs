@@ -3,34 +3,35 @@
 use pipe_graph::prelude::*;
 use smart_default::SmartDefault;
 
-use crate::colour::point::{map_rgb, point, same};
+use crate::colour::point::{map_tinted, point, tinted};
+use crate::components::Rgb;
 use crate::shader;
 
 /// Grades colour as Nuke's Grade does with its black point at 0 and its white point at 1:
 /// A = multiply·(gain − lift), B = offset + lift, out = (A·in + B)^(1/gamma). Alpha is kept.
 ///
-/// Negative values are raised to the power by magnitude and keep their sign.
+/// The power leaves values below 0 as they are. A 1-channel image becomes colour where channels are graded differently.
 #[derive(Debug, SmartDefault, Serialize, Deserialize, JsonSchema)]
 #[serde(default)]
 pub(super) struct Grade {
     /// The image.
     image: In<Image>,
-    /// Where black goes.
-    #[default([0.0, 0.0, 0.0])]
-    lift: [f32; 3],
-    /// Where white goes.
-    #[default([1.0, 1.0, 1.0])]
-    gain: [f32; 3],
+    /// What black becomes: a number, or (r, g, b).
+    #[default(Rgb::grey(0.0))]
+    lift: Rgb,
+    /// What white becomes.
+    #[default(Rgb::grey(1.0))]
+    gain: Rgb,
     /// Exponent 1/gamma, applied last.
-    #[default([1.0, 1.0, 1.0])]
-    #[schemars(range(min = 0.01, max = 100.0))]
-    gamma: [f32; 3],
-    /// Added.
-    #[default([0.0, 0.0, 0.0])]
-    offset: [f32; 3],
-    /// Factor.
-    #[default([1.0, 1.0, 1.0])]
-    multiply: [f32; 3],
+    #[default(Rgb::grey(1.0))]
+    #[schemars(extend("minimum" = 0.01, "maximum" = 100.0))]
+    gamma: Rgb,
+    /// Added after gain and lift.
+    #[default(Rgb::grey(0.0))]
+    offset: Rgb,
+    /// Factor of gain and lift.
+    #[default(Rgb::grey(1.0))]
+    multiply: Rgb,
 }
 
 pub(super) const KIND: Kind = Kind::of::<Grade>(
@@ -39,33 +40,40 @@ pub(super) const KIND: Kind = Kind::of::<Grade>(
     &[
         r#"Grade(image: "in", gain: (1.2, 1.0, 0.9), gamma: (1.1, 1.0, 0.9))"#,
         r#"Grade(image: "in", lift: (0.05, 0.0, -0.02), offset: (0.01, 0.02, 0.03), multiply: (0.9, 1.1, 1.0))"#,
-        r#"Grade(image: "grey", gain: (2, 2, 2))"#,
+        r#"Grade(image: "grey", gain: 2, gamma: 0.8, offset: -0.3)"#,
+        r#"Grade(image: "grey", multiply: (1, 0.8, 0.5))"#,
     ],
 )
-.tolerance(1e-5, 2e-5);
+.tolerance(2e-6, 2e-5);
+
+impl Grade {
+    fn tints(&self) -> bool {
+        ![self.lift, self.gain, self.gamma, self.offset, self.multiply].iter().all(Rgb::is_grey)
+    }
+}
 
 impl Node for Grade {
     fn outputs(&self, inputs: &mut Inputs<'_>) -> Result<Vec<Output>, Mistake> {
-        same(inputs, &self.image)
+        tinted(inputs, &self.image, self.tints())
     }
 
     fn lower(&self, cx: &mut Lowering<'_>) -> Result<(), Mistake> {
         point(cx, &self.image, shader!("colour/grade"))
-            .param("lift", self.lift)
-            .param("gain", self.gain)
-            .param("gamma", self.gamma)
-            .param("offset", self.offset)
-            .param("multiply", self.multiply)
+            .param("lift", self.lift.0)
+            .param("gain", self.gain.0)
+            .param("power", self.gamma.0.map(f32::recip))
+            .param("offset", self.offset.0)
+            .param("multiply", self.multiply.0)
             .add();
         Ok(())
     }
 
     fn reference(&self, cx: &Reference<'_>) -> Vec<Tensor> {
-        map_rgb(cx, &self.image, |c| {
+        map_tinted(cx, &self.image, self.tints(), |c| {
             std::array::from_fn(|i| {
-                let of = |v: &[f32; 3]| f64::from(v[i]);
-                let v = of(&self.multiply) * (of(&self.gain) - of(&self.lift)) * c[i] + of(&self.offset) + of(&self.lift);
-                v.signum() * v.abs().powf(1.0 / of(&self.gamma))
+                let a = self.multiply.at(i) * (self.gain.at(i) - self.lift.at(i));
+                let v = a * c[i] + self.offset.at(i) + self.lift.at(i);
+                if v > 0.0 { v.powf(1.0 / self.gamma.at(i)) } else { v }
             })
         })
     }

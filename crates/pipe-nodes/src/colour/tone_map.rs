@@ -4,7 +4,7 @@ use pipe_graph::prelude::*;
 use smart_default::SmartDefault;
 
 use crate::analysis::reduction::{Mean, mean};
-use crate::colour::curve::{Operator, tone_map};
+use crate::colour::curve::{LEAST_AVERAGE, Operator, tone_map};
 use crate::colour::point::{map_rgb, point, same};
 use crate::shader;
 
@@ -15,6 +15,8 @@ const EPSILON: f32 = 1e-6;
 ///
 /// Yr = key·Y/average; with `Reinhard` D = Yr(1 + Yr/white²)/(1 + Yr), and colour is scaled by D/Y (0 where Y = 0).
 /// E. Reinhard et al., Photographic Tone Reproduction for Digital Images, 2002. Alpha is kept.
+///
+/// The formula holds for negative light too; its pole at Yr = −1 is kept finite.
 #[derive(Debug, SmartDefault, Serialize, Deserialize, JsonSchema)]
 #[serde(default)]
 pub(super) struct ToneMap {
@@ -24,9 +26,11 @@ pub(super) struct ToneMap {
     average: Option<Driven>,
     /// Brightness α that the average is mapped to.
     #[default(Driven::Value(0.18))]
+    #[schemars(range(min = 0.0))]
     key: Driven,
-    /// Smallest luminance W, after scaling, that is mapped to 1.
+    /// Smallest luminance W, after scaling, that is mapped to 1; for `Reinhard` and `Hable`.
     #[default(Driven::Value(4.0))]
+    #[schemars(range(min = 1e-3))]
     white: Driven,
     /// The curve.
     operator: Operator,
@@ -43,10 +47,11 @@ pub(super) const TONE_MAP: Kind = Kind::of::<ToneMap>(
         r#"ToneMap(image: "in", average: 0.5, operator: AcesFit)"#,
         r#"ToneMap(image: "in", average: 0.5, operator: AgX)"#,
         r#"ToneMap(image: "in", average: 0.5, operator: Linear)"#,
+        r#"ToneMap(image: "in", average: 0.01, key: 0.5, white: 1)"#,
         r#"ToneMap(image: "grey", key: "scalar")"#,
     ],
 )
-.tolerance(2e-5, 1e-4);
+.tolerance(2e-6, 2e-5);
 
 impl Node for ToneMap {
     fn outputs(&self, inputs: &mut Inputs<'_>) -> Result<Vec<Output>, Mistake> {
@@ -75,12 +80,8 @@ impl Node for ToneMap {
             Some(given) => cx.driven(given),
             None => {
                 let pixels = &cx.image(&self.image).pixels;
-                let logs: Vec<f64> = pixels
-                    .iter()
-                    .map(|p| luminance(*p))
-                    .filter(|y| y.is_finite())
-                    .map(|y| (f64::from(EPSILON) + y.max(0.0)).ln())
-                    .collect();
+                let finite = pixels.iter().map(|p| luminance(*p)).filter(|y| y.is_finite());
+                let logs: Vec<f64> = finite.map(|y| (f64::from(EPSILON) + y.max(0.0)).ln()).collect();
                 (logs.iter().sum::<f64>() / logs.len().max(1) as f64).exp()
             }
         };
@@ -120,7 +121,7 @@ impl Node for ScaleLuminance {
     }
 
     fn reference(&self, cx: &Reference<'_>) -> Vec<Tensor> {
-        let scale = cx.driven(&self.key) / cx.driven(&self.average);
+        let scale = cx.driven(&self.key) / cx.driven(&self.average).max(LEAST_AVERAGE);
         map_rgb(cx, &self.image, |c| c.map(|v| v * scale))
     }
 }
@@ -134,6 +135,7 @@ pub(super) struct ReinhardCurve {
     image: In<Image>,
     /// Smallest luminance that is mapped to 1.
     #[default(Driven::Value(4.0))]
+    #[schemars(range(min = 1e-3))]
     white: Driven,
 }
 
@@ -142,7 +144,7 @@ pub(super) const REINHARD_CURVE: Kind = Kind::of::<ReinhardCurve>(
     Category::Colour,
     &[r#"ReinhardCurve(image: "in")"#, r#"ReinhardCurve(image: "in", white: "scalar")"#, r#"ReinhardCurve(image: "grey", white: 2)"#],
 )
-.tolerance(2e-5, 1e-4);
+.tolerance(2e-6, 2e-5);
 
 impl Node for ReinhardCurve {
     fn outputs(&self, inputs: &mut Inputs<'_>) -> Result<Vec<Output>, Mistake> {

@@ -33,6 +33,47 @@ pub(super) const KIND: Kind = Kind::of::<BoxBlur>(
 )
 .tolerance(2e-6, 1e-5);
 
+/// Declares the mean of `image` over (2r + 1)² pixels.
+pub(super) fn box_mean(cx: &mut Lowering<'_>, prefix: &str, r: u32, image: ResourceId, out: ResourceId) {
+    let shape = cx.shape(out);
+    let rows = cx.intermediate(&format!("{prefix}rows"), shape);
+    let run = RUN.max(r);
+    let size = cx.image_of(out).size;
+    for (suffix, along_x, from, to) in [("rows", true, image, rows), ("columns", false, rows, out)] {
+        // A run also sees what entered and left since it began.
+        let reach = if along_x { Reach::Around(r + run, 0) } else { Reach::Around(0, r + run) };
+        let grid = if along_x { [size[0].div_ceil(run), size[1], 1] } else { [size[0], size[1].div_ceil(run), 1] };
+        cx.pass(&format!("{prefix}{suffix}"), shader!("filters/box_blur"))
+            .entry(Entry::Each)
+            .grid(Grid::Elements(grid))
+            .read("image", from, reach)
+            .write("out", to)
+            .constant("RADIUS", r as i32)
+            .constant("RUN", run as i32)
+            .constant("ALONG_X", along_x)
+            .add();
+    }
+}
+
+/// The twin of [`box_mean`].
+pub(super) fn box_mean_reference(image: &Raster, radius: u32, border: Border) -> Raster {
+    let r = i64::from(radius);
+    let n = (2 * r + 1) as f64;
+    let pass = |image: &Raster, dx: i64, dy: i64| {
+        Raster::from_fn(image.size, image.channels, |x, y| {
+            let mut sum = [0.0; 4];
+            for k in -r..=r {
+                let p = image.load(x + k * dx, y + k * dy, border);
+                for c in 0..4 {
+                    sum[c] += p[c] / n;
+                }
+            }
+            sum
+        })
+    };
+    pass(&pass(image, 1, 0), 0, 1)
+}
+
 impl Node for BoxBlur {
     fn outputs(&self, inputs: &mut Inputs<'_>) -> Result<Vec<Output>, Mistake> {
         Ok(Output::out(EdgeType::Image(inputs.image(&self.image))))
@@ -40,43 +81,11 @@ impl Node for BoxBlur {
 
     fn lower(&self, cx: &mut Lowering<'_>) -> Result<(), Mistake> {
         let (image, out) = (cx.input(&self.image), cx.output("out"));
-        let shape = cx.shape(out);
-        let rows = cx.intermediate("rows", shape);
-        let r = self.radius;
-        let run = RUN.max(r);
-        let size = cx.image_of(out).size;
-        for (suffix, along_x, from, to) in [("rows", true, image, rows), ("columns", false, rows, out)] {
-            // A run also sees what entered and left since it began.
-            let reach = if along_x { Reach::Around(r + run, 0) } else { Reach::Around(0, r + run) };
-            let grid = if along_x { [size[0].div_ceil(run), size[1], 1] } else { [size[0], size[1].div_ceil(run), 1] };
-            cx.pass(suffix, shader!("filters/box_blur"))
-                .entry(Entry::Each)
-                .grid(Grid::Elements(grid))
-                .read("image", from, reach)
-                .write("out", to)
-                .constant("RADIUS", r as i32)
-                .constant("RUN", run as i32)
-                .constant("ALONG_X", along_x)
-                .add();
-        }
+        box_mean(cx, "", self.radius, image, out);
         Ok(())
     }
 
     fn reference(&self, cx: &Reference<'_>) -> Vec<Tensor> {
-        let r = i64::from(self.radius);
-        let n = (2 * r + 1) as f64;
-        let pass = |image: &Raster, dx: i64, dy: i64| {
-            Raster::from_fn(image.size, image.channels, |x, y| {
-                let mut sum = [0.0; 4];
-                for k in -r..=r {
-                    let p = image.load(x + k * dx, y + k * dy, cx.border);
-                    for c in 0..4 {
-                        sum[c] += p[c] / n;
-                    }
-                }
-                sum
-            })
-        };
-        vec![Tensor::Image(pass(&pass(cx.image(&self.image), 1, 0), 0, 1))]
+        vec![Tensor::Image(box_mean_reference(cx.image(&self.image), self.radius, cx.border))]
     }
 }

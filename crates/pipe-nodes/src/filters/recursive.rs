@@ -9,7 +9,7 @@
 
 use pipe_graph::prelude::*;
 
-use crate::filters::gaussian::{Axis, convolve_reference, weights};
+use crate::filters::gaussian::{Axis, both_axes, convolve, wide_weights};
 use crate::shader;
 
 /// (Re, Im) of α and λ; each stands for itself and its conjugate.
@@ -19,7 +19,7 @@ const LAMBDA: [(f64, f64); 2] = [(1.783, 0.6318), (1.723, 1.997)];
 /// Standard deviations after which the response is below 2e-5.
 const WARM: f32 = 6.0;
 
-/// Below it the sum over pixels is no longer the integral: the filter is not used.
+/// Below it the sum over pixels is no longer the integral: a convolution takes its place.
 const LEAST_SIGMA: f32 = 0.5;
 
 /// Poles and gains of one σ.
@@ -52,53 +52,46 @@ fn response(sigma: f32) -> Response {
 }
 
 /// Declares both axes.
-pub(super) fn recursive(cx: &mut Lowering<'_>, prefix: &str, sigma: [f32; 2], image: ResourceId, out: ResourceId) {
-    let shape = cx.shape(out);
-    let size = cx.image_of(out).size;
-    let middle = cx.intermediate(&format!("{prefix}rows"), shape);
-    for (suffix, axis, sigma, from, to) in [("rows", Axis::X, sigma[0], image, middle), ("columns", Axis::Y, sigma[1], middle, out)] {
-        let forward = cx.intermediate(&format!("{prefix}{suffix}.forward"), shape);
-        let s = sigma.max(LEAST_SIGMA);
-        let Response { poles, gains } = response(s);
-        let warm = (WARM * s).ceil() as u32;
-        let run = 128.max(2 * warm);
-        let along_x = axis == Axis::X;
-        let reach = if along_x { Reach::Around(run + warm, 0) } else { Reach::Around(0, run + warm) };
-        let grid = if along_x { [size[0].div_ceil(run), size[1], 1] } else { [size[0], size[1].div_ceil(run), 1] };
-        for (name, backward) in [("forward", false), ("backward", true)] {
-            let mut pass = cx
-                .pass(
-                    &format!("{prefix}{suffix}.{name}"),
-                    if backward { shader!("filters/recursive_backward") } else { shader!("filters/recursive_forward") },
-                )
-                .entry(Entry::Each)
-                .grid(Grid::Elements(grid))
-                .read("image", from, reach);
-            if backward {
-                pass = pass.read("forward", forward, reach);
-            }
-            pass.write("out", if backward { to } else { forward })
-                .constant("RUN", run as i32)
-                .constant("WARM", warm as i32)
-                .constant("ALONG_X", along_x)
-                .param("pole0", poles[0])
-                .param("pole1", poles[1])
-                .param("gain0", gains[0])
-                .param("gain1", gains[1])
-                .add();
-        }
-    }
+pub(super) fn recursive(cx: &mut Lowering<'_>, sigma: [f32; 2], image: ResourceId, out: ResourceId) {
+    both_axes(cx, "", sigma, [image, out], recursive_axis);
 }
 
-/// What it approximates: the Gaussian itself, cut only where it is below 1e-14.
-pub(super) fn recursive_reference(image: &Raster, sigma: [f32; 2], border: Border) -> Raster {
-    let wide = |s: f32| weights(s.max(LEAST_SIGMA), (8.0 * s.max(LEAST_SIGMA)).ceil() as u32);
-    convolve_reference(&convolve_reference(image, Axis::X, &wide(sigma[0]), border), Axis::Y, &wide(sigma[1]), border)
+/// Declares one axis: a filter to the right, and one to the left that adds what the first found.
+pub(super) fn recursive_axis(cx: &mut Lowering<'_>, suffix: &str, axis: Axis, sigma: f32, [image, out]: [ResourceId; 2]) {
+    if sigma < LEAST_SIGMA {
+        return convolve(cx, suffix, axis, &wide_weights(sigma), image, out);
+    }
+    let (shape, size) = (cx.shape(out), cx.image_of(out).size);
+    let forward = cx.intermediate(&format!("{suffix}.forward"), shape);
+    let Response { poles, gains } = response(sigma);
+    let warm = (WARM * sigma).ceil() as u32;
+    let run = 128.max(2 * warm);
+    let along_x = axis == Axis::X;
+    let reach = if along_x { Reach::Around(run + warm, 0) } else { Reach::Around(0, run + warm) };
+    let grid = if along_x { [size[0].div_ceil(run), size[1], 1] } else { [size[0], size[1].div_ceil(run), 1] };
+    for (name, backward) in [("forward", false), ("backward", true)] {
+        let shader = if backward { shader!("filters/recursive_backward") } else { shader!("filters/recursive_forward") };
+        let mut pass =
+            cx.pass(&format!("{suffix}.{name}"), shader).entry(Entry::Each).grid(Grid::Elements(grid)).read("image", image, reach);
+        if backward {
+            pass = pass.read("forward", forward, reach);
+        }
+        pass.write("out", if backward { out } else { forward })
+            .constant("RUN", run as i32)
+            .constant("WARM", warm as i32)
+            .constant("ALONG_X", along_x)
+            .param("pole0", poles[0])
+            .param("pole1", poles[1])
+            .param("gain0", gains[0])
+            .param("gain1", gains[1])
+            .add();
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::filters::gaussian::weights;
 
     /// The response is within 1e-3 of the Gaussian, as a weight and summed up to a step.
     #[test]

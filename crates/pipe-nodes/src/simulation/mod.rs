@@ -8,7 +8,7 @@ mod jacobi;
 mod life;
 mod reaction_diffusion;
 mod stability;
-mod state;
+pub(crate) mod state;
 mod wave;
 mod wave_equation;
 mod wave_step;

@@ -1,4 +1,4 @@
-//! What the loops of this section begin with.
+//! What loops begin with.
 
 use pipe_graph::prelude::*;
 
@@ -22,7 +22,7 @@ pub(super) fn begin(cx: &mut Lowering<'_>, image: ResourceId) -> ResourceId {
 }
 
 /// An image in 32-bit floats, with its own channels.
-pub(super) fn widened(cx: &mut Lowering<'_>, image: ResourceId) -> ResourceId {
+pub(crate) fn widened(cx: &mut Lowering<'_>, image: ResourceId) -> ResourceId {
     let ty = cx.image_of(image);
     let shape = Shape::image(ty.size, ty.channels);
     if cx.shape(image) == shape {

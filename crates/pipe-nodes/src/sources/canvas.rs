@@ -3,11 +3,13 @@
 use pipe_graph::lowering::PassBuilder;
 use pipe_graph::prelude::*;
 
+use crate::components::Size;
+
 /// Width and height of a source when none is given.
-pub(super) const SIZE: [u32; 2] = [512, 512];
+pub(super) const SIZE: Size = Size([512, 512]);
 
 /// An image of this size, or what is wrong with it.
-pub(super) fn image(size: [u32; 2], channels: u8) -> Result<Vec<Output>, Mistake> {
+pub(super) fn image(Size(size): Size, channels: u8) -> Result<Vec<Output>, Mistake> {
     if size.contains(&0) {
         return Err(Mistake::in_field("size", "has no pixels").hint("expected (width, height), each at least 1"));
     }

@@ -3,6 +3,7 @@
 use pipe_graph::prelude::*;
 use smart_default::SmartDefault;
 
+use crate::components::{Rgba, Size};
 use crate::shader;
 use crate::sources::canvas::{SIZE, image, paint};
 
@@ -11,19 +12,19 @@ use crate::sources::canvas::{SIZE, image, paint};
 #[serde(default)]
 pub(super) struct Checkerboard {
     /// The first colour.
-    #[default([0.2, 0.2, 0.2, 1.0])]
-    a: [f32; 4],
+    #[default(Rgba([0.2, 0.2, 0.2, 1.0]))]
+    a: Rgba,
     /// The second colour.
-    #[default([0.8, 0.8, 0.8, 1.0])]
-    b: [f32; 4],
+    #[default(Rgba([0.8, 0.8, 0.8, 1.0]))]
+    b: Rgba,
     /// Side of a square.
     #[default = 32]
     #[schemars(range(min = 1, max = 65536), extend("x-unit" = "px"))]
     cell: u32,
-    /// Width and height.
+    /// Width and height; one number for a square.
     #[default(SIZE)]
     #[schemars(extend("x-unit" = "px"))]
-    size: [u32; 2],
+    size: Size,
 }
 
 pub(super) const KIND: Kind = Kind::of::<Checkerboard>(
@@ -40,14 +41,14 @@ impl Node for Checkerboard {
     }
 
     fn lower(&self, cx: &mut Lowering<'_>) -> Result<(), Mistake> {
-        paint(cx, shader!("sources/checkerboard")).param("a", self.a).param("b", self.b).param("cell", self.cell as i32).add();
+        paint(cx, shader!("sources/checkerboard")).param("a", self.a.0).param("b", self.b.0).param("cell", self.cell as i32).add();
         Ok(())
     }
 
     fn reference(&self, _: &Reference<'_>) -> Vec<Tensor> {
         let cell = i64::from(self.cell);
-        vec![Tensor::Image(Raster::from_fn(self.size, 4, |x, y| {
-            if (x / cell + y / cell) % 2 == 0 { self.a.map(f64::from) } else { self.b.map(f64::from) }
+        vec![Tensor::Image(Raster::from_fn(self.size.0, 4, |x, y| {
+            if (x / cell + y / cell) % 2 == 0 { self.a.0.map(f64::from) } else { self.b.0.map(f64::from) }
         }))]
     }
 }

@@ -3,6 +3,7 @@
 use pipe_graph::prelude::*;
 use smart_default::SmartDefault;
 
+use crate::components::Size;
 use crate::shader;
 use crate::sources::canvas::{SIZE, image, paint};
 
@@ -10,10 +11,10 @@ use crate::sources::canvas::{SIZE, image, paint};
 #[derive(Debug, SmartDefault, Serialize, Deserialize, JsonSchema)]
 #[serde(default)]
 pub(super) struct ColorBars {
-    /// Width and height.
+    /// Width and height; one number for a square.
     #[default(SIZE)]
     #[schemars(extend("x-unit" = "px"))]
-    size: [u32; 2],
+    size: Size,
 }
 
 pub(super) const KIND: Kind =
@@ -32,8 +33,8 @@ impl Node for ColorBars {
 
     fn reference(&self, _: &Reference<'_>) -> Vec<Tensor> {
         let bars = [[1, 1, 1], [1, 1, 0], [0, 1, 1], [0, 1, 0], [1, 0, 1], [1, 0, 0], [0, 0, 1], [0, 0, 0]];
-        let w = i64::from(self.size[0]);
-        vec![Tensor::Image(Raster::from_fn(self.size, 4, |x, _| {
+        let w = i64::from(self.size.0[0]);
+        vec![Tensor::Image(Raster::from_fn(self.size.0, 4, |x, _| {
             let [r, g, b] = bars[(x * 8 / w).min(7) as usize].map(|v| 0.75 * f64::from(v));
             [r, g, b, 1.0]
         }))]

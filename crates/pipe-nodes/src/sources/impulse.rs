@@ -3,6 +3,7 @@
 use pipe_graph::prelude::*;
 use smart_default::SmartDefault;
 
+use crate::components::Size;
 use crate::shader;
 use crate::sources::canvas::{SIZE, image, paint};
 
@@ -15,10 +16,10 @@ pub(super) struct Impulse {
     /// Its value.
     #[default = 1.0]
     value: f32,
-    /// Width and height.
+    /// Width and height; one number for a square.
     #[default(SIZE)]
     #[schemars(extend("x-unit" = "px"))]
-    size: [u32; 2],
+    size: Size,
 }
 
 pub(super) const KIND: Kind = Kind::of::<Impulse>(
@@ -30,7 +31,7 @@ pub(super) const KIND: Kind = Kind::of::<Impulse>(
 
 impl Impulse {
     fn at(&self) -> [u32; 2] {
-        self.position.unwrap_or(self.size.map(|n| n / 2))
+        self.position.unwrap_or(self.size.0.map(|n| n / 2))
     }
 }
 
@@ -46,6 +47,6 @@ impl Node for Impulse {
 
     fn reference(&self, _: &Reference<'_>) -> Vec<Tensor> {
         let [x0, y0] = self.at().map(i64::from);
-        vec![Tensor::Image(Raster::from_fn(self.size, 1, |x, y| if (x, y) == (x0, y0) { [f64::from(self.value); 4] } else { [0.0; 4] }))]
+        vec![Tensor::Image(Raster::from_fn(self.size.0, 1, |x, y| if (x, y) == (x0, y0) { [f64::from(self.value); 4] } else { [0.0; 4] }))]
     }
 }

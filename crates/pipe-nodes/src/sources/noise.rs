@@ -3,6 +3,7 @@
 use pipe_graph::prelude::*;
 use smart_default::SmartDefault;
 
+use crate::components::Size;
 use crate::shader;
 use crate::sources::canvas::{SIZE, image, paint};
 
@@ -27,10 +28,10 @@ pub(super) struct Noise {
     octaves: u32,
     /// Another seed, another noise.
     seed: u32,
-    /// Width and height.
+    /// Width and height; one number for a square.
     #[default(SIZE)]
     #[schemars(extend("x-unit" = "px"))]
-    size: [u32; 2],
+    size: Size,
 }
 
 /// Kinds of noise.
@@ -133,7 +134,7 @@ fn value(kind: Variety, x: f64, y: f64, seed: u32) -> f64 {
 impl Noise {
     /// Cells a pixel.
     fn scale(&self) -> f32 {
-        if self.kind == Variety::White { 1.0 } else { self.frequency / self.size[0].max(self.size[1]) as f32 }
+        if self.kind == Variety::White { 1.0 } else { self.frequency / self.size.0[0].max(self.size.0[1]) as f32 }
     }
 
     fn octaves(&self) -> u32 {
@@ -161,7 +162,7 @@ impl Node for Noise {
     fn reference(&self, cx: &Reference<'_>) -> Vec<Tensor> {
         let seed = self.seed ^ cx.seed as u32;
         let scale = f64::from(self.scale());
-        vec![Tensor::Image(Raster::from_fn(self.size, 1, |x, y| {
+        vec![Tensor::Image(Raster::from_fn(self.size.0, 1, |x, y| {
             let (mut sum, mut weights) = (0.0, 0.0);
             for octave in 0..self.octaves() {
                 let (f, w) = (f64::from(1_u32 << octave), 0.5_f64.powi(octave as i32));

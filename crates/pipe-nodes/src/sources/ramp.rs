@@ -3,6 +3,7 @@
 use pipe_graph::prelude::*;
 use smart_default::SmartDefault;
 
+use crate::components::{Rgba, Size};
 use crate::shader;
 use crate::sources::canvas::{SIZE, image, paint};
 
@@ -11,17 +12,17 @@ use crate::sources::canvas::{SIZE, image, paint};
 #[serde(default)]
 pub(super) struct Ramp {
     /// The colour of the first pixel.
-    #[default([0.0, 0.0, 0.0, 1.0])]
-    from: [f32; 4],
+    #[default(Rgba([0.0, 0.0, 0.0, 1.0]))]
+    from: Rgba,
     /// The colour of the last pixel.
-    #[default([1.0, 1.0, 1.0, 1.0])]
-    to: [f32; 4],
+    #[default(Rgba([1.0, 1.0, 1.0, 1.0]))]
+    to: Rgba,
     /// Along which axis.
     direction: Direction,
-    /// Width and height.
+    /// Width and height; one number for a square.
     #[default(SIZE)]
     #[schemars(extend("x-unit" = "px"))]
-    size: [u32; 2],
+    size: Size,
 }
 
 pub(super) const KIND: Kind = Kind::of::<Ramp>(
@@ -48,19 +49,19 @@ impl Node for Ramp {
 
     fn lower(&self, cx: &mut Lowering<'_>) -> Result<(), Mistake> {
         paint(cx, shader!("sources/ramp"))
-            .param("first", self.from)
-            .param("last", self.to)
+            .param("first", self.from.0)
+            .param("last", self.to.0)
             .constant("ALONG_X", matches!(self.direction, Direction::Horizontal))
             .add();
         Ok(())
     }
 
     fn reference(&self, _: &Reference<'_>) -> Vec<Tensor> {
-        let [w, h] = self.size;
-        vec![Tensor::Image(Raster::from_fn(self.size, 4, |x, y| {
+        let [w, h] = self.size.0;
+        vec![Tensor::Image(Raster::from_fn(self.size.0, 4, |x, y| {
             let (at, n) = if matches!(self.direction, Direction::Horizontal) { (x, w) } else { (y, h) };
             let t = at as f64 / f64::from((n - 1).max(1));
-            std::array::from_fn(|c| f64::from(self.from[c]) * (1.0 - t) + f64::from(self.to[c]) * t)
+            std::array::from_fn(|c| f64::from(self.from.0[c]) * (1.0 - t) + f64::from(self.to.0[c]) * t)
         }))]
     }
 }

@@ -3,6 +3,7 @@
 use pipe_graph::prelude::*;
 use smart_default::SmartDefault;
 
+use crate::components::Size;
 use crate::shader;
 use crate::sources::canvas::{SIZE, image, paint};
 
@@ -11,10 +12,10 @@ use crate::sources::canvas::{SIZE, image, paint};
 #[derive(Debug, SmartDefault, Serialize, Deserialize, JsonSchema)]
 #[serde(default)]
 pub(super) struct ZonePlate {
-    /// Width and height.
+    /// Width and height; one number for a square.
     #[default(SIZE)]
     #[schemars(extend("x-unit" = "px"))]
-    size: [u32; 2],
+    size: Size,
 }
 
 pub(super) const KIND: Kind =
@@ -32,9 +33,9 @@ impl Node for ZonePlate {
     }
 
     fn reference(&self, _: &Reference<'_>) -> Vec<Tensor> {
-        let n = f64::from(self.size[0].max(self.size[1]));
-        let centre = self.size.map(|n| f64::from(n) / 2.0);
-        vec![Tensor::Image(Raster::from_fn(self.size, 1, |x, y| {
+        let n = f64::from(self.size.0[0].max(self.size.0[1]));
+        let centre = self.size.0.map(|n| f64::from(n) / 2.0);
+        vec![Tensor::Image(Raster::from_fn(self.size.0, 1, |x, y| {
             let (dx, dy) = (x as f64 + 0.5 - centre[0], y as f64 + 0.5 - centre[1]);
             [0.5 + 0.5 * (std::f64::consts::PI * (dx * dx + dy * dy) / n).cos(); 4]
         }))]

@@ -9,7 +9,7 @@ use std::fmt::Write as _;
 use pipe_graph::pass::{Entry, Grid, Limits, Profile, ResourceId, Shape};
 use pipe_graph::types::Precision;
 
-use super::layout::Block;
+use super::layout;
 use super::ports::narrow;
 use crate::PlanError;
 use crate::kernel_pass::{KernelPass, Ops, Source};
@@ -103,11 +103,10 @@ fn position(entry: Entry, source: &str, shape: Shape) -> &'static str {
 }
 
 /// The main module of everything but a `Kernel`.
-pub(super) fn main_module(pass: &KernelPass, cover: &Cover, _: &Block, ops: &Ops, index: &dyn Fn(ResourceId, bool) -> usize) -> String {
+pub(super) fn main_module(pass: &KernelPass, cover: &Cover, ops: &Ops, index: &dyn Fn(ResourceId, bool) -> usize) -> String {
     let main = pass.stages.len() - 1;
     let stage = pass.last();
-    let bind: String =
-        (0..=main).filter(|s| !pass.stages[*s].params.is_empty()).map(|s| format!("    package::s{s}::bind_params();\n")).collect();
+    let bind: String = layout::bind_calls(pass).iter().map(|call| format!("    {call}\n")).collect();
     if stage.entry == Entry::Points {
         return format!(
             "@vertex\nfn vertex_main(@builtin(vertex_index) i: u32) -> @builtin(position) vec4f {{\n{bind}\

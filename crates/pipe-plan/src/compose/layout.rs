@@ -9,7 +9,6 @@ use crate::kernel_pass::{KernelPass, Stage};
 /// Where each parameter stands.
 pub(super) struct Block {
     fields: Vec<Field>,
-    kernel: bool,
 }
 
 struct Field {
@@ -53,7 +52,6 @@ fn words(value: &Value) -> Vec<u8> {
 
 impl Block {
     pub(super) fn new(pass: &KernelPass) -> Self {
-        let kernel = pass.last().entry == Entry::Kernel;
         let mut fields = Vec::new();
         let mut offset = 0_usize;
         for (stage, s) in pass.stages.iter().enumerate() {
@@ -67,7 +65,7 @@ impl Block {
                 offset += bytes;
             }
         }
-        Self { fields, kernel }
+        Self { fields }
     }
 
     /// The content, padded to 16 bytes; empty when there are no parameters.
@@ -85,8 +83,7 @@ impl Block {
         format!("struct Uniforms {{\n{fields}}}\n@group(0) @binding(0) var<uniform> uniforms: Uniforms;\n")
     }
 
-    /// `params` of one stage: private, filled at the start of the entry point by `bind_params`; in a `Kernel`, which
-    /// has an entry point of its own, by a call that is put at the start of it.
+    /// `params` of one stage: private, filled by `bind_params`.
     pub(super) fn params(&self, text: &mut String, stage: usize, s: &Stage, drivers: &[ResourceId]) {
         if s.params.is_empty() {
             return;
@@ -108,11 +105,21 @@ impl Block {
             "struct Params {{\n{members}}}\nvar<private> params: Params;\nfn bind_params() {{ params = Params({}); }}\n",
             values.join(", ")
         );
-        if self.kernel
-            && let Some(at) = body_of_main(text)
-        {
-            text.insert_str(at, " bind_params(); ");
-        }
+    }
+}
+
+/// The calls that fill `params` of all stages, for the start of the entry point.
+pub(super) fn bind_calls(pass: &KernelPass) -> Vec<String> {
+    // The last stage of a `Kernel` is the main module itself.
+    let main = (pass.last().entry == Entry::Kernel).then(|| pass.stages.len() - 1);
+    let with_params = (0..pass.stages.len()).filter(|s| !pass.stages[*s].params.is_empty());
+    with_params.map(|s| if main == Some(s) { "bind_params();".to_owned() } else { format!("package::s{s}::bind_params();") }).collect()
+}
+
+/// Puts those calls at the start of a `Kernel`'s own entry point, in the line of its brace, so that lines keep their numbers.
+pub(super) fn bind_in_main(text: &mut String, pass: &KernelPass) {
+    if let Some(at) = body_of_main(text) {
+        text.insert_str(at, &format!(" {} ", bind_calls(pass).join(" ")));
     }
 }
 

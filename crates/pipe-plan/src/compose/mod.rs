@@ -139,12 +139,17 @@ impl<'a> Composer<'a> {
             if stage.entry == Entry::Point {
                 ports::point_value(&mut text, s, pass, &index);
             }
-            let name = if kernel_entry && s == main { "main".to_owned() } else { format!("s{s}") };
+            let name = if kernel_entry && s == main {
+                layout::bind_in_main(&mut text, pass);
+                "main".to_owned()
+            } else {
+                format!("s{s}")
+            };
             modules.push((name, text));
         }
         let grid = entry::Cover::new(pass, self.ops, self.limits)?;
         if !kernel_entry {
-            modules.push(("main".to_owned(), entry::main_module(pass, &grid, &block, self.ops, &index)));
+            modules.push(("main".to_owned(), entry::main_module(pass, &grid, self.ops, &index)));
         }
         let trusted = pass.stages.iter().all(|s| s.shader.trusted);
         let labels: Vec<&str> = pass.stages.iter().map(|s| &*s.shader.path).collect();

@@ -75,6 +75,9 @@ pub(crate) struct RunArgs {
     /// Frames of a sequence: `1-100`, `1-100x5`; files are named `in.####.exr` or `in.%04d.exr`.
     #[arg(long, value_name = "A-B[xSTEP]")]
     pub(crate) frames: Option<String>,
+    /// Frames a second: what `time` counts by, and the speed of .apng and .gif outputs.
+    #[arg(long, value_name = "N", default_value_t = 24.0)]
+    pub(crate) fps: f64,
     /// Skip frames whose outputs are there already.
     #[arg(long)]
     pub(crate) resume: bool,
@@ -323,6 +326,10 @@ pub(crate) fn job(a: &RunArgs) -> Result<Job, Failure> {
     job.budget = a.device.vram.as_deref().map(bytes).transpose()?;
     job.seed = a.seed;
     job.timeout = Some(std::time::Duration::from_secs(a.timeout.max(1)));
+    if !(a.fps > 0.0 && a.fps <= 1000.0) {
+        return Err(Failure::Graph(format!("--fps {}: expected more than 0, at most 1000", a.fps)));
+    }
+    job.rate = a.fps;
     job.force = a.force;
     job.profile = a.trace.is_some();
     if let Some(most) = a.max_pixels {

@@ -1,0 +1,3 @@
+fn sigma_t(p: vec3f) -> f32 {
+    return params.sigma_t;
+}

@@ -1,0 +1,4 @@
+// Twice as bright.
+fn apply(image: vec4f) -> vec4f {
+    return image.rgb * 2.0;
+}
