@@ -243,3 +243,25 @@ fn a_nan_fills_a_morphological_element() {
         }
     }
 }
+
+/// lavapipe ends an invocation without a word after 65,535 iterations over all its loops.
+#[test]
+fn the_longest_loops_come_to_their_end() {
+    let mut bench = Bench::new();
+    let size = [300, 300];
+    let ones = |_: &str| Tensor::Image(Raster::from_fn(size, 1, |_, _| [1.0; 4]));
+    for node in ["BlurH", "BlurV"] {
+        // Of ones the result is the sum of the weights.
+        let graph = graph(&format!("{node}(image: \"grey\", sigma: 1000)"), "out", "Clamp", size);
+        for profile in [Profile::Gpu, Profile::Cpu] {
+            let off = furthest(run(&mut bench, &graph, profile, &ones).into_iter().map(|v| (v, 1.0)));
+            assert!(off < 3e-6, "{node} {profile:?}: off by {off:.2e}");
+        }
+    }
+    // A dot grows to a disk, cut by the image.
+    let dot = |_: &str| Tensor::Image(Raster::from_fn(size, 1, |x, y| [f64::from(u8::from((x, y) == (0, 299))); 4]));
+    let graph = graph("Dilate(image: \"grey\", radius: 280, shape: Disk)", "out", "Black", size);
+    let grown = run(&mut bench, &graph, Profile::Cpu, &dot).iter().filter(|v| **v == 1.0).count();
+    let inside = (0..300_u64).flat_map(|y| (0..300_u64).map(move |x| x * x + y * y)).filter(|d| *d <= 280 * 280).count();
+    assert_eq!(grown, inside);
+}

@@ -1,5 +1,5 @@
 //! The free tests of every node: each of its examples, on the GPU against its twin in double precision, at awkward
-//! sizes and with every border.
+//! sizes and with every border, and once with the kernels for the other kind of machine.
 //!
 //! `cargo test -p pipe-tests --test nodes -- Blur` runs those whose name contains `Blur`.
 
@@ -7,11 +7,12 @@ use std::collections::HashMap;
 
 use pipe_graph::graph::Graph;
 use pipe_graph::node::{Category, Kind};
-use pipe_graph::pass::{Item, Limits, Origin, Reach, ResourceId, Shape};
+use pipe_graph::pass::{Item, Limits, Origin, Profile, Reach, ResourceId, Shape};
 use pipe_graph::reference::{Raster, Tensor};
 use pipe_graph::types::EdgeType;
+use pipe_plan::Options;
 use pipe_plan::lower::{Rim, lower};
-use pipe_tests::bench::{Bench, compile, reference};
+use pipe_tests::bench::{Bench, compile, plan, reference};
 use pipe_tests::source::{edge, edge_type};
 
 const SIZES: [[u32; 2]; 5] = [[61, 47], [1, 1], [1, 33], [70, 1], [257, 129]];
@@ -78,12 +79,16 @@ fn named(example: &str) -> impl Iterator<Item = &'static str> + '_ {
 }
 
 fn every_variant(bench: &mut Bench, kind: &Kind, example: &str) -> Result<(), String> {
+    let limits = bench.limits();
     for size in SIZES {
-        one(bench, kind, example, size, "")?;
+        one(bench, &limits, kind, example, size, "")?;
     }
     for border in BORDERS {
-        one(bench, kind, example, [61, 47], &format!("border: {border}"))?;
+        one(bench, &limits, kind, example, [61, 47], &format!("border: {border}"))?;
     }
+    // Kernels for the other kind of machine are right on this one too.
+    let profile = if limits.profile == Profile::Gpu { Profile::Cpu } else { Profile::Gpu };
+    one(bench, &Limits { profile, ..limits }, kind, example, SIZES[4], "")?;
     reach_is_true(bench, kind, example)
 }
 
@@ -150,13 +155,14 @@ fn declared_reach(graph: &Graph, limits: &Limits) -> Option<[u32; 2]> {
     (most[0] < 30 && most[1] < 23).then_some(most)
 }
 
-fn one(bench: &mut Bench, kind: &Kind, example: &str, size: [u32; 2], options: &str) -> Result<(), String> {
+fn one(bench: &mut Bench, limits: &Limits, kind: &Kind, example: &str, size: [u32; 2], options: &str) -> Result<(), String> {
     let types: Vec<(&str, EdgeType)> = named(example).map(|n| (n, edge_type(n, size))).collect();
     let ports: Vec<String> = kind.ports.iter().map(|p| p.0.to_owned()).collect();
     let text = graph_text(kind, example, options, &ports);
     let graph = compile(&text, &types).map_err(|e| format!("{text}\n{e}"))?;
     let input = |name: &str| edge(name, size);
-    let got = bench.gpu(&graph, &input)?;
+    let plan = plan(&graph, limits, &Options::default())?;
+    let got = bench.run(&graph, plan, &input)?;
     let expected = reference(&graph, &input);
     for port in &ports {
         let (Some(got), Some(expected)) = (got.get(port), expected.get(port)) else {
@@ -170,8 +176,9 @@ fn one(bench: &mut Bench, kind: &Kind, example: &str, size: [u32; 2], options: &
             let fits = (g - e).abs() <= bound || (g.is_nan() && e.is_nan()) || g == e;
             if !fits {
                 return Err(format!(
-                    "`{port}`[{i}] is {g}, expected {e} (off by {:.3e}, allowed {bound:.3e}) at {size:?} {options}",
-                    (g - e).abs()
+                    "`{port}`[{i}] is {g}, expected {e} (off by {:.3e}, allowed {bound:.3e}) at {size:?} {options}, {:?} kernels",
+                    (g - e).abs(),
+                    limits.profile
                 ));
             }
         }
