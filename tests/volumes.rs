@@ -409,6 +409,36 @@ fn filters_agree_with_scipy() {
     }
 }
 
+/// Some drivers end an invocation silently after 65,535 turns of all its loops: the longest that fields allow must do.
+#[test]
+fn the_longest_loops_come_to_their_end() {
+    // Brighter away from the eye, and so few slices that no brick can be leapt over.
+    let ramp = |size: [u32; 3]| {
+        Block::from_fn(size, 1, |x, y, z| [f64::from((0.9 - (z as f32 - x as f32 * 0.001 + y as f32 * 0.01) / size[2] as f32).abs()); 4])
+    };
+    let camera = "camera: (size: (8, 128))";
+    for (size, node, port) in [
+        ([5, 4, 7], format!(r#"MaximumIntensity(volume: "v", steps: 4096, {camera})"#), "out"),
+        ([5, 4, 7], format!(r#"Isosurface(volume: "v", iso: 0.8, steps: 4096, {camera})"#), "depth"),
+        ([5, 4, 7], format!(r#"VolumeRender(volume: "v", steps: 4096, alpha_exponent: 0.001, alpha_center: 500, {camera})"#), "out"),
+        ([600, 3, 2], r#"VolumeBlur(volume: "v", sigma: 100)"#.to_owned(), "out"),
+        ([2048, 3, 2], r#"VolumeResample(volume: "v", resolution: 1)"#.to_owned(), "out"),
+    ] {
+        let text = format!(r#"Graph(version: 1, inputs: {{"v": Volume}}, nodes: {{"n": {node}}}, outputs: {{"out": "n.{port}"}})"#);
+        let graph = compile(&text, &[("v", EdgeType::volume(size, 1))]).unwrap_or_else(|e| panic!("{e}"));
+        let input = |_: &str| Tensor::Volume(ramp(size));
+        let (got, expected) = (Bench::new().gpu(&graph, &input).unwrap(), reference(&graph, &input));
+        let off = got["out"].iter().zip(&expected["out"]).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+        assert!(off < 1e-3, "{node}: off by {off}");
+    }
+    let row = mesh(
+        r#""noise": VolumeNoise(resolution: [2046, 4, 4], frequency: 900, octaves: 1),
+           "mesh": MarchingCubes(volume: "noise", options: (border: Black))"#,
+    );
+    row.assert_watertight();
+    assert!(row.vertices.iter().any(|v| v[0] > 0.999), "the walk along a row ends early");
+}
+
 /// Buffers that a shader binds have a largest size: volumes cross the rim in bands of slices.
 #[test]
 fn volumes_cross_the_rim_in_bands() {
