@@ -9,8 +9,8 @@ use std::path::Path;
 use pipe::run::{Job, Session};
 use pipe_graph::pass::Limits;
 use pipe_graph::reference::{Block, Tensor};
-use pipe_graph::types::EdgeType;
-use pipe_tests::bench::{Bench, Values, compile};
+use pipe_graph::types::{EdgeType, Element};
+use pipe_tests::bench::{Bench, Values, compile, reference};
 use pipe_tests::source::{edge, edge_type};
 
 type Vector = [f64; 3];
@@ -157,6 +157,24 @@ fn both_orders_of_compositing_agree() {
     }
 }
 
+/// Rays leap over bricks that a table makes transparent, and see what they would see without.
+#[test]
+fn tables_with_empty_ends_agree_with_the_twin() {
+    let row = |alpha: f64| [0.9, 0.5 * alpha, 0.2, alpha];
+    for alphas in [[0.0, 0.0, 0.0, 0.2, 0.4], [0.0, 0.0, 0.3, 0.0, 0.0], [0.1, 0.0, 0.0, 0.2, 0.0], [0.0; 5]] {
+        let table: Vec<f64> = alphas.iter().flat_map(|a| row(*a)).map(|v| f64::from(v as f32)).collect();
+        let text = r#"Graph(version: 1, inputs: {"volume": Volume, "table": Table}, nodes: {
+            "seen": VolumeRender(volume: "volume", transfer: "table", steps: 90, camera: (eye: (1.6, 1.9, -1.2), size: (40, 37)))
+        }, outputs: {"out": "seen"})"#;
+        let types = [("volume", EdgeType::volume([21, 18, 15], 1)), ("table", EdgeType::table(20, Element::F32))];
+        let graph = compile(text, &types).unwrap_or_else(|e| panic!("{e}"));
+        let input = |name: &str| if name == "table" { Tensor::Table(table.clone()) } else { edge("volume", [1, 1]) };
+        let (got, expected) = (Bench::new().gpu(&graph, &input).unwrap(), reference(&graph, &input));
+        let off = got["out"].iter().zip(&expected["out"]).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+        assert!(off < 1e-4, "{alphas:?}: off by {off}");
+    }
+}
+
 /// A mesh as its PLY file has it.
 struct Mesh {
     vertices: Vec<Vector>,
@@ -264,12 +282,44 @@ fn the_mesh_of_a_sphere_is_a_sphere() {
 fn the_mesh_of_a_torus_has_a_hole() {
     let ring = mesh(
         r#""ring": VolumeShape(shape: Torus, resolution: [64, 64, 32], size: 0.3, softness: 0.1),
-           "mesh": MarchingCubes(volume: "ring")"#,
+           "mesh": MarchingCubes(volume: "ring", extent: (10, 20, 15))"#,
     );
     ring.assert_watertight();
     assert_eq!(ring.euler(), 0);
-    let volume = 2.0 * std::f64::consts::PI.powi(2) * 0.3 * 0.1 * 0.1;
+    let volume = 2.0 * std::f64::consts::PI.powi(2) * 0.3 * 0.1 * 0.1 * 3000.0;
     assert!((ring.volume() / volume - 1.0).abs() < 0.02, "volume {}, not {volume}", ring.volume());
+}
+
+/// The preset `mesh` on a scan of a ball of 3 mm, whose voxels are 0.5 mm by 0.25 mm by 0.4 mm.
+#[test]
+fn the_mesh_of_a_scan_has_its_size() {
+    use pipe_io::volume::{Volume, Voxel, write};
+    let (size, spacing) = ([20_u32, 40, 25], [0.5_f32, 0.25, 0.4]);
+    let folder = tempfile::tempdir().unwrap();
+    let mut floats = Vec::new();
+    for z in 0..size[2] {
+        for y in 0..size[1] {
+            for x in 0..size[0] {
+                let squared: f32 =
+                    [x, y, z].iter().zip(size).zip(spacing).map(|((i, n), d)| ((*i as f32 + 0.5 - n as f32 / 2.0) * d).powi(2)).sum();
+                floats.push((0.3 + 0.2 * (3.0 - squared.sqrt())).clamp(0.0, 1.0));
+            }
+        }
+    }
+    write(&folder.path().join("ball.nrrd"), &Volume::of_floats(size, 1, spacing, &floats, Voxel::F32)).unwrap();
+    let mut session = Session::open(&pipe_gpu::Choice::parse(&std::env::var("PIPE_DEVICE").unwrap_or_default()), None).unwrap();
+    let file = |name: &str| folder.path().join(name).display().to_string();
+    let mut job = Job::new("mesh");
+    job.settings = vec![("smooth".to_owned(), "0".to_owned())];
+    job.bind_input("in", &file("ball.nrrd"));
+    job.bind_output("out", &file("ball.ply")).unwrap();
+    session.run(&job).unwrap_or_else(|e| panic!("{e}"));
+    let ball = read_ply(&folder.path().join("ball.ply"));
+    ball.assert_watertight();
+    let volume = 4.0 / 3.0 * std::f64::consts::PI * 27.0;
+    assert!((ball.volume() / volume - 1.0).abs() < 0.02, "volume {}, not {volume}", ball.volume());
+    let lengths = ball.vertices.iter().map(|v| sub(*v, [5.0; 3])).map(|v| dot(v, v).sqrt());
+    assert!(lengths.into_iter().all(|r| (r - 3.0).abs() < 0.05));
 }
 
 /// Noise meets every ambiguous case, and the faces of the cube; a black border closes it there.
@@ -357,6 +407,36 @@ fn filters_agree_with_scipy() {
     for (got, expected) in values["gradient"][at..at + 3].iter().zip([1.9090909, -0.2272727, -1.4545455]) {
         assert!((got - expected).abs() < 1e-5, "gradient: {got}, not {expected}");
     }
+}
+
+/// Some drivers end an invocation silently after 65,535 turns of all its loops: the longest that fields allow must do.
+#[test]
+fn the_longest_loops_come_to_their_end() {
+    // Brighter away from the eye, and so few slices that no brick can be leapt over.
+    let ramp = |size: [u32; 3]| {
+        Block::from_fn(size, 1, |x, y, z| [f64::from((0.9 - (z as f32 - x as f32 * 0.001 + y as f32 * 0.01) / size[2] as f32).abs()); 4])
+    };
+    let camera = "camera: (size: (8, 128))";
+    for (size, node, port) in [
+        ([5, 4, 7], format!(r#"MaximumIntensity(volume: "v", steps: 4096, {camera})"#), "out"),
+        ([5, 4, 7], format!(r#"Isosurface(volume: "v", iso: 0.8, steps: 4096, {camera})"#), "depth"),
+        ([5, 4, 7], format!(r#"VolumeRender(volume: "v", steps: 4096, alpha_exponent: 0.001, alpha_center: 500, {camera})"#), "out"),
+        ([600, 3, 2], r#"VolumeBlur(volume: "v", sigma: 100)"#.to_owned(), "out"),
+        ([2048, 3, 2], r#"VolumeResample(volume: "v", resolution: 1)"#.to_owned(), "out"),
+    ] {
+        let text = format!(r#"Graph(version: 1, inputs: {{"v": Volume}}, nodes: {{"n": {node}}}, outputs: {{"out": "n.{port}"}})"#);
+        let graph = compile(&text, &[("v", EdgeType::volume(size, 1))]).unwrap_or_else(|e| panic!("{e}"));
+        let input = |_: &str| Tensor::Volume(ramp(size));
+        let (got, expected) = (Bench::new().gpu(&graph, &input).unwrap(), reference(&graph, &input));
+        let off = got["out"].iter().zip(&expected["out"]).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+        assert!(off < 1e-3, "{node}: off by {off}");
+    }
+    let row = mesh(
+        r#""noise": VolumeNoise(resolution: [2046, 4, 4], frequency: 900, octaves: 1),
+           "mesh": MarchingCubes(volume: "noise", options: (border: Black))"#,
+    );
+    row.assert_watertight();
+    assert!(row.vertices.iter().any(|v| v[0] > 0.999), "the walk along a row ends early");
 }
 
 /// Buffers that a shader binds have a largest size: volumes cross the rim in bands of slices.

@@ -11,12 +11,12 @@ fn store_vertex(number: u32, p: vec3i, axis: i32) {
     let a = load_volume(p - PAD).r;
     let b = load_volume(q - PAD).r;
     let vertex = mix(place(p), place(q), clamp((params.iso - a) / (b - a), 0.0, 1.0));
-    var normal = facing(gradient(vertex));
+    var normal = facing(gradient(vertex) / params.extent);
     if all(normal == vec3f(0.0)) {
         normal[axis] = sign(a - b);
     }
     for (var i = 0; i < 3; i++) {
-        store_vertices(i32(6u * number) + i, vertex[i]);
+        store_vertices(i32(6u * number) + i, vertex[i] * params.extent[i]);
         store_vertices(i32(6u * number) + 3 + i, normal[i]);
     }
 }

@@ -3,7 +3,8 @@ fn entry(i: i32) -> vec4f {
 }
 
 fn emptiness(p: vec3f, direction: vec3f) -> f32 {
-    return 0.0;
+    let here = brick(p, direction);
+    return select(0.0, here.length, here.extreme <= load_threshold().r);
 }
 
 fn transfer(p: vec3f) -> vec4f {

@@ -111,18 +111,18 @@ fn normal(path: &Path) -> PathBuf {
     out
 }
 
+/// Adds `NAME.dx`, `NAME.dy` and `NAME.dz`.
+fn spacing_names(env: &mut Env, name: &str, spacing: [f32; 3]) {
+    for (field, distance) in ["dx", "dy", "dz"].into_iter().zip(spacing) {
+        env.set(&format!("{name}.{field}"), f64::from(distance));
+    }
+}
+
 /// The field of a struct, with its value.
 fn field_of<'t>(tree: &'t Tree, name: &str) -> Option<&'t Field> {
     match &tree.value {
         Syntax::Struct(_, fields) => fields.iter().find(|(key, _)| key.value == name),
         _ => None,
-    }
-}
-
-/// Adds `NAME.dx`, `NAME.dy` and `NAME.dz`.
-fn spacing_names(env: &mut Env, name: &str, spacing: [f32; 3]) {
-    for (field, distance) in ["dx", "dy", "dz"].into_iter().zip(spacing) {
-        env.set(&format!("{name}.{field}"), f64::from(distance));
     }
 }
 

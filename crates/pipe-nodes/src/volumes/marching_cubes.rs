@@ -29,6 +29,9 @@ pub(super) struct MarchingCubes {
     /// error that says how many.
     #[schemars(range(min = 1, max = 178956970))]
     max_triangles: Option<u32>,
+    /// Lengths of the volume's edges in the mesh: positions run from 0 to these.
+    #[default([1.0, 1.0, 1.0])]
+    extent: [f32; 3],
 }
 
 pub(super) const KIND: Kind = Kind::of::<MarchingCubes>(
@@ -38,6 +41,7 @@ pub(super) const KIND: Kind = Kind::of::<MarchingCubes>(
         r#"MarchingCubes(volume: "volume")"#,
         r#"MarchingCubes(volume: "fog", iso: 0.8)"#,
         r#"MarchingCubes(volume: "volume", iso: "scalar")"#,
+        r#"MarchingCubes(volume: "volume", extent: (1, 0.5, 2))"#,
     ],
 )
 .tolerance(2e-4, 0.0);
@@ -73,6 +77,13 @@ impl Lattice {
 }
 
 impl Node for MarchingCubes {
+    fn open(&mut self, _: &Opening<'_>) -> Result<(), Mistake> {
+        if self.extent.iter().all(|n| *n > 0.0) {
+            return Ok(());
+        }
+        Err(Mistake::in_field("extent", "is no box").hint("expected three lengths above 0"))
+    }
+
     fn outputs(&self, inputs: &mut Inputs<'_>) -> Result<Vec<Output>, Mistake> {
         // The border is known only when lowering; the layer around may need a little more.
         let lattice = Lattice::new(inputs.volume(&self.volume).size, Border::Black);
@@ -95,6 +106,7 @@ impl Node for MarchingCubes {
                 .read_with("volume", volume, Reach::Whole, border, Filter::Linear)
                 .read("cases", cases, Reach::Whole)
                 .driven("iso", &self.iso)
+                .param("extent", self.extent)
                 .param("points", lattice.points.map(|n| n as i32))
                 .constant("PAD", lattice.pad as i32)
                 .constant("STRIDE", STRIDE as i32);
@@ -136,6 +148,7 @@ impl Node for MarchingCubes {
         let density = |p: [i64; 3]| volume.load(p.map(|i| i - pad), cx.border)[0];
         let place = |p: [i64; 3]| -> DVec3 { std::array::from_fn(|i| ((p[i] - pad) as f64 + 0.5) / f64::from(volume.size[i])).into() };
         let grid = || (0..d).flat_map(move |z| (0..h).flat_map(move |y| (0..w).map(move |x| [x, y, z])));
+        let extent = DVec3::from(self.extent.map(f64::from));
         let mut mesh = Triangles::default();
         let mut numbers = std::collections::HashMap::new();
         for p in grid() {
@@ -147,10 +160,10 @@ impl Node for MarchingCubes {
                     continue;
                 }
                 let vertex = place(p).lerp(place(q), ((iso - a) / (b - a)).clamp(0.0, 1.0));
-                let normal = facing(gradient(volume, vertex, cx.border));
+                let normal = facing(gradient(volume, vertex, cx.border) / extent);
                 let outwards = if a > b { DVec3::AXES[axis] } else { -DVec3::AXES[axis] };
                 numbers.insert((p, axis), mesh.vertices.len() as u32);
-                mesh.vertices.push(vertex.to_array());
+                mesh.vertices.push((vertex * extent).to_array());
                 mesh.normals.push(if normal == DVec3::ZERO { outwards } else { normal }.to_array());
             }
         }

@@ -121,6 +121,13 @@ fn look_up(table: &[f64], d: f64) -> (DVec3, f64) {
     (DVec3::new(v[0], v[1], v[2]), v[3].clamp(0.0, 1.0))
 }
 
+/// The density, as a scalar, up to which a table makes everything transparent.
+fn transparent_below(cx: &mut Lowering<'_>, table: ResourceId) -> ResourceId {
+    let threshold = cx.intermediate("threshold", Shape::Scalar);
+    cx.pass("threshold", shader!("volumes/transfer_threshold")).read("transfer", table, Reach::Whole).write("out", threshold).add();
+    threshold
+}
+
 impl Node for VolumeRender {
     fn outputs(&self, inputs: &mut Inputs<'_>) -> Result<Vec<Output>, Mistake> {
         if let EdgeOr::Edge(table) = &self.transfer {
@@ -139,27 +146,29 @@ impl Node for VolumeRender {
             EdgeOr::Edge(table) => Some(cx.input(table)),
             EdgeOr::Value(Transfer::Lecture) => None,
         };
+        let render = with_bricks(&shader!("volumes/volume_render"));
         let (shader, transfer) = match table {
-            Some(_) => (shader!("volumes/volume_render"), shader!("volumes/transfer_table")),
-            None => (with_bricks(&with_shading(&shader!("volumes/volume_render"))), shader!("volumes/transfer_lecture")),
+            Some(_) => (render, shader!("volumes/transfer_table")),
+            None => (with_shading(&render), shader!("volumes/transfer_lecture")),
         };
-        let bricks = table.is_none().then(|| extremes(cx, volume, border, self.alpha_exponent >= 0.0));
+        let bricks = extremes(cx, volume, border, table.is_some() || self.alpha_exponent >= 0.0);
+        let threshold = table.map(|table| transparent_below(cx, table));
         let pass = cx.pass("", Shader::builtin(&shader.path, &format!("{}\n{}", shader.source, transfer.source)));
         let mut pass = self
             .camera
             .describe(pass)
             .read_with("volume", volume, Reach::Whole, border, Filter::Linear)
+            .read_with("bricks", bricks, Reach::Whole, Border::Clamp, Filter::Nearest)
             .write("out", out)
             .constant("BACK_TO_FRONT", self.order == Order::BackToFront)
             .param("step_length", self.step() as f32)
             .param("light", self.light)
             .param("alpha_exponent", self.alpha_exponent)
             .param("alpha_center", self.alpha_center);
-        if let Some(table) = table {
-            pass = pass.read("transfer", table, Reach::Whole);
-        }
-        if let Some(bricks) = bricks {
-            pass = pass.read_with("bricks", bricks, Reach::Whole, Border::Clamp, Filter::Nearest);
+        for (port, id) in [("transfer", table), ("threshold", threshold)] {
+            if let Some(id) = id {
+                pass = pass.read(port, id, Reach::Whole);
+            }
         }
         pass.add();
         Ok(())
