@@ -27,7 +27,18 @@ fn first_vertex(yz: vec2i) -> u32 {
     return select(0u, load_vertex_sums(row - 1), row > 0 && all(yz < params.points.yz));
 }
 
+/// Whether the surface does not come near a row.
+fn is_empty(row: i32) -> bool {
+    if row == 0 {
+        return load_vertex_sums(0) == 0u && load_triangle_sums(0) == 0u;
+    }
+    return load_vertex_sums(row) == load_vertex_sums(row - 1) && load_triangle_sums(row) == load_triangle_sums(row - 1);
+}
+
 fn each(row: i32) {
+    if is_empty(row) {
+        return;
+    }
     let yz = row_place(row);
     var first = vec4u(first_vertex(yz), first_vertex(yz + vec2i(1, 0)), first_vertex(yz + vec2i(0, 1)), first_vertex(yz + vec2i(1, 1)));
     var triangle = select(0u, load_triangle_sums(row - 1), row > 0);

@@ -12,10 +12,15 @@ fn inside(x: i32, yz: vec2i, number: u32) -> u32 {
     return select(0u, 1u << number, load_volume(p - PAD).r >= params.iso);
 }
 
-/// The inside points of the eight rows at x, as bits. Beyond the last point or row the last one stands again, so that no
+/// The inside points of rows 0 to 3 at x, as bits. Beyond the last point or row the last one stands again, so that no
 /// edge crosses the surface there.
+fn near_insides(x: i32, yz: vec2i) -> u32 {
+    return inside(x, yz, 0u) | inside(x, yz + vec2i(1, 0), 1u) | inside(x, yz + vec2i(0, 1), 2u) | inside(x, yz + vec2i(1, 1), 3u);
+}
+
+/// The same of all eight rows.
 fn insides(x: i32, yz: vec2i) -> u32 {
-    let near = inside(x, yz, 0u) | inside(x, yz + vec2i(1, 0), 1u) | inside(x, yz + vec2i(0, 1), 2u) | inside(x, yz + vec2i(1, 1), 3u);
+    let near = near_insides(x, yz);
     let high = inside(x, yz + vec2i(2, 0), 4u) | inside(x, yz + vec2i(2, 1), 5u);
     return near | high | inside(x, yz + vec2i(0, 2), 6u) | inside(x, yz + vec2i(1, 2), 7u);
 }

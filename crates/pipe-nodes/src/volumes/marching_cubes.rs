@@ -25,8 +25,8 @@ pub(super) struct MarchingCubes {
     /// The density of the surface.
     #[default(0.5.into())]
     iso: Driven,
-    /// Room for so many triangles; absent: for what smooth surfaces need, at least 262,144. A mesh that needs more is an
-    /// error that says how many.
+    /// Room for so many triangles; absent: for what smooth surfaces need, at least 262,144, if the device can hold it. A mesh
+    /// that needs more is an error that says how many.
     #[schemars(range(min = 1, max = 178956970))]
     max_triangles: Option<u32>,
     /// Lengths of the volume's edges in the mesh: positions run from 0 to these.
@@ -69,11 +69,17 @@ impl Lattice {
     fn room(&self, asked: Option<u32>) -> MeshType {
         let [x, y, z] = self.points.map(u64::from);
         let cells = (x - 1) * (y - 1) * (z - 1);
-        let smooth = 32 * (x * y + y * z + z * x);
+        let smooth = 16 * (x * y + y * z + z * x);
         let triangles = asked.map_or(smooth.max(LEAST_ROOM), u64::from).min(5 * cells).clamp(1, u64::from(u32::MAX) / 24);
         let vertices = triangles.max(LEAST_ROOM).min(3 * x * y * z);
         MeshType { max_vertices: vertices as u32, max_triangles: triangles as u32 }
     }
+}
+
+/// As much of the room as buffers of this size hold.
+fn within(room: MeshType, bytes: u64) -> MeshType {
+    let most = |each: u64| u32::try_from(bytes / each).unwrap_or(u32::MAX);
+    MeshType { max_vertices: room.max_vertices.min(most(24)), max_triangles: room.max_triangles.min(most(12)) }
 }
 
 impl Node for MarchingCubes {
@@ -96,6 +102,7 @@ impl Node for MarchingCubes {
             unreachable!("the resolver bound a volume, and `outputs` has declared a mesh")
         };
         let lattice = Lattice::new(ty.size, border);
+        let room = if self.max_triangles.is_none() { within(room, cx.limits().max_binding_bytes) } else { room };
         let cases = cx.uints("cases", &cube_table::words());
         let pass = |cx: &mut Lowering<'_>, name: &str, source: Shader, reads: &[(&str, ResourceId)], writes: &[(&str, ResourceId)]| {
             let rows = format!("{}\n{}", source.source, shader!("volumes/marching_rows").source);
