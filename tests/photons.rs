@@ -1,8 +1,9 @@
 //! Light in media: photons against formulas, published tables and each other.
 
+use pipe_graph::pass::Limits;
 use pipe_graph::prelude::*;
-use pipe_graph::reference::{Block, Tensor};
-use pipe_tests::bench::{Bench, Values, compile};
+use pipe_plan::Options;
+use pipe_tests::bench::{Bench, Values, compile, plan};
 
 /// Runs a PhotonScatter with these fields and answers all of its ports. `fog` is a volume of σt = 4 everywhere, `cloud`
 /// one that varies.
@@ -63,7 +64,7 @@ fn energy_is_kept_whatever_the_options() {
             for tracking in ["March", "Delta"] {
                 let (phase, boundary) = (phases[(i + j) % 3], ["Absorb", "PeriodicXZ"][(i + j) % 2]);
                 let (estimator, random) = (["Collision", "TrackLength"][j % 2], ["Counter", "Tausworthe"][i % 2]);
-                let (albedo, energy) = ([0.0, 0.5, 1.0][(i + 2 * j) % 3], [0.001, 0.3, 1.0][j]);
+                let (albedo, energy) = ([0.0, 0.5, 1.0][(i + 2 * j) % 3], [0.0, 0.3, 1.0][j]);
                 let fields = format!(
                     "medium: {medium}, light: {light}, tracking: {tracking}, phase: {phase}, boundary: {boundary}, estimator: {estimator}, \
                      random: {random}, albedo: {albedo}, min_energy: {energy}, resolution: [5, 4, 3], photons: 777, batches: 3"
@@ -142,7 +143,36 @@ fn a_slab_reflects_and_transmits_as_published_to_four_digits() {
     agree("transmittance", t, 0.66096, 1.5 * error, 3.0);
 }
 
-/// Isotropic scattering without absorption: what is not reflected is transmitted, and a half-space reflects everything.
+/// Chandrasekhar's H function of isotropic scattering, from its integral equation (Radiative Transfer, 1960, section 38).
+fn chandrasekhar_h(albedo: f64, mu: f64) -> f64 {
+    let n = 400;
+    let nodes: Vec<f64> = (0..n).map(|i| (f64::from(i) + 0.5) / f64::from(n)).collect();
+    let next = |h: &[f64], mu: f64| {
+        let integral: f64 = nodes.iter().zip(h).map(|(m, h)| m * h / (mu + m) / f64::from(n)).sum();
+        1.0 / ((1.0 - albedo).sqrt() + 0.5 * albedo * integral)
+    };
+    let mut h = vec![1.0; nodes.len()];
+    for _ in 0..100 {
+        h = nodes.iter().map(|mu| next(&h, *mu)).collect();
+    }
+    next(&h, mu)
+}
+
+/// A half-space that scatters isotropically reflects 1 − √(1 − albedo)·H(1) of light that meets it squarely.
+#[test]
+fn a_half_space_reflects_what_chandrasekhar_says() {
+    let mut bench = Bench::new();
+    assert!((chandrasekhar_h(0.9, 1.0) - 1.8501).abs() < 1e-3, "{}", chandrasekhar_h(0.9, 1.0));
+    for albedo in [0.5, 0.9, 0.99] {
+        let n = 200_000;
+        let [r, t] = slab(&mut bench, 200.0, albedo, 0.0, n, 4);
+        let expected = 1.0 - (1.0 - albedo).sqrt() * chandrasekhar_h(albedo, 1.0);
+        agree(&format!("albedo {albedo}"), r, expected, 0.45 / f64::from(n).sqrt(), 3.0);
+        assert!(t < 1e-4);
+    }
+}
+
+/// Isotropic scattering without absorption: what is not reflected is transmitted.
 #[test]
 fn a_slab_that_absorbs_nothing_keeps_nothing() {
     let [r, t] = slab(&mut Bench::new(), 5.0, 1.0, 0.0, 50_000, 3);
@@ -175,6 +205,19 @@ fn collisions_and_paths_estimate_the_same_fluence() {
     }
 }
 
+/// What is absorbed is (1 − albedo)·∫σt·Φ.
+#[test]
+fn fluence_is_absorbed_as_the_medium_says() {
+    let mut bench = Bench::new();
+    for estimator in ["Collision", "TrackLength"] {
+        let fields =
+            format!("medium: Homogeneous(6), {POINT}, albedo: 0.7, resolution: [4, 5, 6], photons: 100000, estimator: {estimator}");
+        let v = photons(&mut bench, &fields);
+        let absorbed = 0.3 * 6.0 * v["fluence"].iter().sum::<f64>() / 120.0;
+        assert!((absorbed / v["absorbed"][0] - 1.0).abs() < 0.01, "{estimator}: {absorbed} {}", v["absorbed"][0]);
+    }
+}
+
 #[test]
 fn a_constant_volume_is_a_homogeneous_medium() {
     let mut bench = Bench::new();
@@ -204,7 +247,7 @@ fn both_generators_tell_the_same() {
 fn roulette_changes_no_mean() {
     let mut bench = Bench::new();
     let base = format!("medium: Homogeneous(8), {POINT}, resolution: 5, photons: 60000, batches: 32");
-    let weights = photons(&mut bench, &format!("{base}, min_energy: 1e-6"));
+    let weights = photons(&mut bench, &format!("{base}, min_energy: 0"));
     for energy in ["0.01", "0.5", "1"] {
         let roulette = photons(&mut bench, &format!("{base}, min_energy: {energy}, seed: 1"));
         let square = mean_square_difference(&weights, &roulette);
@@ -242,6 +285,27 @@ fn the_same_seed_gives_the_same_bits() {
     assert_ne!(first, photons(&mut bench, &base.replace("seed: 9", "seed: 10")));
 }
 
+/// Other numbers of threads and other lengths of dispatches, on the same device.
+#[test]
+fn how_work_is_cut_into_dispatches_changes_no_bit() {
+    let mut bench = Bench::new();
+    let camera = "camera: (eye: (0.6, 0.5, 0.9), fov: 60, size: (140, 120))";
+    for node in [
+        format!("PhotonScatter(medium: CloudChamber, {POINT}, resolution: 5, photons: 9000, tracking: Delta, batches: 2)"),
+        format!("PhotonScatter(medium: Homogeneous(9), {POINT}, resolution: 5, photons: 9000, random: Tausworthe, estimator: TrackLength)"),
+        format!("GatherWalk(medium: CloudChamber, light: Point([0.5, 0.9, 0.5]), {camera}, paths: 2, max_bounces: 8)"),
+    ] {
+        let text = format!(r#"Graph(version: 1, inputs: {{}}, nodes: {{"a": {node}}}, outputs: {{"out": "a"}})"#);
+        let graph = compile(&text, &[]).unwrap_or_else(|e| panic!("{e}"));
+        let [gpu, cpu] = [Profile::Gpu, Profile::Cpu].map(|profile| {
+            let limits = Limits { profile, ..bench.limits() };
+            let plan = plan(&graph, &limits, &Options::default()).unwrap_or_else(|e| panic!("{e}"));
+            bench.run(&graph, plan, &volume).unwrap_or_else(|e| panic!("{e}"))
+        });
+        assert_eq!(gpu, cpu, "{node}");
+    }
+}
+
 #[test]
 fn more_photons_can_be_added_to_an_earlier_result() {
     let mut bench = Bench::new();
@@ -259,6 +323,24 @@ fn more_photons_can_be_added_to_an_earlier_result() {
     // The spread of twelve batches tells what that of four does.
     let sum = |v: &Values| v["error"].iter().sum::<f64>();
     assert!((0.6..1.7).contains(&(sum(&whole) / sum(&parts))), "{} {}", sum(&whole), sum(&parts));
+}
+
+/// Numbers that no medium has make it empty or dense, not endless.
+#[test]
+fn odd_densities_do_no_harm() {
+    let mut bench = Bench::new();
+    for (what, odd, absorbed) in [("NaN", f64::NAN, 0.0), ("below 0", -1e30, 0.0), ("infinity", f64::INFINITY, 1.0), ("huge", 1e30, 1.0)] {
+        for tracking in ["March", "Delta"] {
+            let text = format!(
+                r#"Graph(version: 1, inputs: {{"odd": Volume}}, nodes: {{
+                "p": PhotonScatter(medium: "odd", {POINT}, tracking: {tracking}, albedo: 0, resolution: 2, photons: 200)}}, outputs: {{"out": "p.absorbed"}})"#
+            );
+            let graph = compile(&text, &[("odd", EdgeType::volume([4, 4, 4], 1))]).unwrap_or_else(|e| panic!("{e}"));
+            let input = |_: &str| Tensor::Volume(Block::from_fn([4, 4, 4], 1, |_, _, _| [odd; 4]));
+            let v = bench.gpu(&graph, &input).unwrap_or_else(|e| panic!("{e}"));
+            assert!((v["out"][0] - absorbed).abs() < 1e-6, "{what}, {tracking}: {:?}", v["out"]);
+        }
+    }
 }
 
 #[test]
@@ -285,4 +367,70 @@ fn unscattered_light_leaves_through_the_face_that_it_meets() {
     // Missing the cube is leaving it, along the longest part of the direction.
     let v = photons(&mut bench, "medium: Homogeneous(1), light: Beam([2, 3, 4], [0.1, 0.9, 0.2]), resolution: 2, photons: 100");
     assert_eq!(v["faces"], [0.0, 0.0, 0.0, 1.0, 0.0, 0.0]);
+}
+
+/// Pearson's χ² of how often values fall between edges, less its mean, in standard deviations of χ².
+fn surprise(values: &[f64], edges: &[f64], share: impl Fn(f64, f64) -> f64) -> f64 {
+    let bins = edges.len() - 1;
+    let mut counts = vec![0.0; bins];
+    for v in values {
+        counts[edges.partition_point(|e| e <= v).clamp(1, bins) - 1] += 1.0;
+    }
+    let expected = |i: usize| share(edges[i], edges[i + 1]) * values.len() as f64;
+    let squared: f64 = (0..bins).map(|i| (counts[i] - expected(i)).powi(2) / expected(i)).sum();
+    (squared - (bins - 1) as f64) / (2.0 * (bins - 1) as f64).sqrt()
+}
+
+#[test]
+fn directions_are_distributed_as_the_phase_functions_say() {
+    let mut bench = Bench::new();
+    let n = 100_000;
+    let even = |from: f64, to: f64, bins: i32| (0..=bins).map(|i| from + (to - from) * f64::from(i) / f64::from(bins)).collect::<Vec<_>>();
+    let rayleigh = |mu: f64| (mu * mu * mu + 3.0 * mu + 4.0) / 8.0;
+    let henyey = |g: f64, mu: f64| (1.0 - g * g) / (2.0 * g) * ((1.0 + g * g - 2.0 * g * mu).powf(-0.5) - 1.0 / (1.0 + g));
+    for (phase, g) in [(0, 0.0), (1, 0.0), (2, 0.75), (2, -0.4), (2, 0.98), (2, 0.001)] {
+        for direction in ["0, 0, 1", "0.6, -0.64, -0.48"] {
+            let text = format!(
+                r#"Graph(version: 1, inputs: {{}}, nodes: {{"s": Scattered(phase: {phase}, g: {g}, direction: ({direction}), count: {n})}}, outputs: {{"out": "s"}})"#
+            );
+            let graph = compile(&text, &[]).unwrap_or_else(|e| panic!("{e}"));
+            let drawn = bench.gpu(&graph, &volume).unwrap_or_else(|e| panic!("{e}")).remove("out").unwrap_or_default();
+            let cosines: Vec<f64> = drawn.iter().step_by(2).copied().collect();
+            let turns: Vec<f64> = drawn.iter().skip(1).step_by(2).copied().collect();
+            let below = |mu: f64| match phase {
+                0 => 0.5 * mu + 0.5,
+                1 => rayleigh(mu),
+                _ => henyey(g, mu),
+            };
+            let what = format!("phase {phase}, g {g}, along {direction}");
+            let mean = cosines.iter().sum::<f64>() / f64::from(n);
+            agree(&what, mean, g, 1.0 / f64::from(n).sqrt(), 3.0);
+            // Narrow bins where nearly all light goes.
+            let edges = if g > 0.9 { even(0.9, 1.0, 40) } else { even(-1.0, 1.0, 40) };
+            let inside: Vec<f64> = cosines.into_iter().filter(|mu| *mu >= edges[0]).collect();
+            let all = below(1.0) - below(edges[0]);
+            let odd = surprise(&inside, &edges, |a, b| (below(b) - below(a)) / all);
+            assert!(odd < 4.0, "{what}: cosines are {odd:.1} deviations off");
+            let odd = surprise(&turns, &even(0.0, 1.0, 36), |a, b| b - a);
+            assert!(odd < 4.0, "{what}: turns are {odd:.1} deviations off");
+        }
+    }
+}
+
+#[test]
+fn a_sum_that_overflows_does_not_look_right() {
+    let mut bench = Bench::new();
+    let text = r#"Graph(version: 1, inputs: {"before": Table}, nodes: {
+        "p": PhotonScatter(medium: Homogeneous(5), light: Point([0.5, 0.5, 0.5]), resolution: 1, photons: 100, earlier: "before"),
+    }, outputs: {"fluence": "p.fluence", "error": "p.error"})"#;
+    let graph = compile(text, &[("before", EdgeType::table(25, Element::U32))]).unwrap_or_else(|e| panic!("{e}"));
+    for (high, overflows) in [(0xffff_ffff_u32, true), (0x7fff_ffff, false)] {
+        // Ten photons in one batch, and a fluence whose low word is about to be carried into the high one.
+        let mut before = vec![0.0; 25];
+        (before[0], before[1], before[2]) = (10.0, 1.0, 10.0);
+        (before[20], before[21]) = (4_294_967_295.0, f64::from(high));
+        let v = bench.gpu(&graph, &|_| Tensor::Table(before.clone())).unwrap_or_else(|e| panic!("{e}"));
+        assert_eq!(v["fluence"][0].is_nan(), overflows);
+        assert_eq!(v["error"][0].is_nan(), overflows);
+    }
 }

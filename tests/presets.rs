@@ -1,5 +1,5 @@
-//! Every preset that makes an image of one image or one volume, from file to file, against its twin in double precision and against a picture that
-//! the twin made earlier.
+//! Every preset that takes one image, one volume or nothing, from file to file, against its twin in double precision and
+//! against a picture that the twin made earlier.
 //!
 //! `PIPE_BLESS=1 cargo test -p pipe-tests --test presets` writes the pictures anew, from the twin, never from the GPU.
 
@@ -49,18 +49,28 @@ fn lumps() -> Block {
     })
 }
 
-/// Parameters of the presets that would take a twin too long at their defaults.
-const SMALLER: [(&str, u32); 7] =
-    [("size", 96), ("photons", 4000), ("voxels", 12), ("paths", 2), ("width", 48), ("height", 27), ("steps", 60)];
-
 /// What a preset is given: a file, and the same in double precision.
 struct Subject {
-    file: String,
-    value: Tensor,
-    ty: EdgeType,
+    input: Option<(String, Tensor, EdgeType)>,
+    settings: Vec<(String, String)>,
 }
 
+/// Little work for presets that take nothing.
+const SMALL: [(&str, &str); 4] = [
+    ("cloud-chamber", "size=56 photons=40000 voxels=14"),
+    ("fog-light", "width=64 height=36 photons=20000 voxels=14 paths=4"),
+    ("reaction-diffusion", "size=96 steps=400"),
+    ("wave-pool", "size=96 steps=20"),
+];
+
 impl Subject {
+    /// For a preset without inputs.
+    fn nothing(preset: &str) -> Self {
+        let settings = SMALL.iter().find(|(name, _)| *name == preset).map_or("", |(_, settings)| settings);
+        let settings = settings.split(' ').filter_map(|s| s.split_once('=')).map(|(name, value)| (name.to_owned(), value.to_owned()));
+        Self { input: None, settings: settings.collect() }
+    }
+
     /// `None` for presets that take something else.
     fn of(kind: EdgeKind, folder: &std::path::Path) -> Option<Self> {
         match kind {
@@ -68,7 +78,7 @@ impl Subject {
                 let file = path(INPUT);
                 let picture = raster(&read(&file));
                 let ty = EdgeType::image(picture.size, 4);
-                Some(Self { file, value: Tensor::Image(picture), ty })
+                Some(Self { input: Some((file, Tensor::Image(picture), ty)), settings: Vec::new() })
             }
             EdgeKind::Volume => {
                 let (file, block) = (folder.join("lumps.nrrd"), lumps());
@@ -76,7 +86,8 @@ impl Subject {
                 let volume = Volume::of_floats(block.size, 1, [1.0; 3], &floats, Voxel::F32);
                 pipe_io::volume::write(&file, &volume).unwrap_or_else(|e| panic!("{e}"));
                 let ty = EdgeType::volume(block.size, 1);
-                Some(Self { file: file.display().to_string(), value: Tensor::Volume(block), ty })
+                let settings = vec![("size".to_owned(), "96".to_owned())];
+                Some(Self { input: Some((file.display().to_string(), Tensor::Volume(block), ty)), settings })
             }
             _ => None,
         }
@@ -108,74 +119,57 @@ fn presets_agree_with_their_twins_and_goldens() {
     let folder = tempfile::tempdir().expect("a folder");
     let bless = std::env::var_os("PIPE_BLESS").is_some();
     let (mut seen, mut wrong) = (0, Vec::new());
-    for name in presets::names() {
-        let mut project = Project::open(name).unwrap_or_else(|e| panic!("{e}"));
+    for preset in presets::names() {
+        let mut project = Project::open(preset).unwrap_or_else(|e| panic!("{e}"));
         let document = project.document.clone().expect("presets parse");
-        if document.inputs.len() > 1 || document.outputs.is_empty() {
-            continue;
-        }
-        let input = document.inputs.first().map(|i| i.name.value.clone());
-        let subject = document.inputs.first().and_then(|i| Subject::of(i.kind, folder.path()));
-        if input.is_some() != subject.is_some() {
-            continue;
-        }
-        // Pictures come small; of volumes the picture is made small, of sources everything.
-        let made_smaller = match subject.as_ref().map(|s| s.ty) {
-            None => SMALLER.as_slice(),
-            Some(EdgeType::Volume(_)) => &SMALLER[..1],
-            Some(_) => &[],
+        let subject = match document.inputs.as_slice() {
+            [] => Some(Subject::nothing(preset)),
+            [input] => Subject::of(input.kind, folder.path()),
+            _ => None,
         };
-        let smaller = made_smaller.iter().filter(|(name, _)| document.params.iter().any(|p| p.name.value == *name));
-        let settings: Vec<_> = smaller.map(|(name, value)| ((*name).to_owned(), value.to_string())).collect();
+        let Some(mut subject) = subject else { continue };
+        subject.settings.retain(|(name, _)| document.params.iter().any(|p| p.name.value == *name));
+        let given = |value: EdgeType| (document.inputs[0].name.value.clone(), value);
         let request = Request {
-            inputs: input.iter().zip(&subject).map(|(name, s)| (name.clone(), s.ty)).collect(),
-            settings: settings.clone(),
+            inputs: subject.input.iter().map(|(_, _, ty)| given(*ty)).collect(),
+            settings: subject.settings.clone(),
             frame: 1.0,
             ..Request::default()
         };
         let graph = project.resolve(&request, &World::default()).unwrap_or_else(|| panic!("{}", project.render(false)));
-        let (_, value) = graph.outputs().next().expect("it has an output");
-        if graph.ty(value).kind() != EdgeKind::Image {
-            continue;
-        }
-        seen += 1;
-        // A user's shader has no twin; such a preset has its golden alone.
-        let twin = graph.iter().all(|(_, i)| i.kind != "Wgsl").then(|| {
-            let values = evaluate(&graph, &|_| subject.as_ref().expect("it is asked for its input").value.clone());
-            match values.get(&value) {
-                Some(Tensor::Image(raster)) => raster.clone(),
-                _ => panic!("{name} makes no image"),
+        let twins = evaluate(&graph, &|_| subject.input.as_ref().expect("it asks for its input").1.clone());
+        let pictures = graph.outputs().filter(|(_, value)| graph.ty(*value).kind() == EdgeKind::Image);
+        for (output, value) in pictures {
+            seen += 1;
+            let Some(Tensor::Image(twin)) = twins.get(&value) else { panic!("{preset} makes no image") };
+            // Presets with several pictures have a golden for each.
+            let name = if graph.outputs().count() == 1 { preset.to_owned() } else { format!("{preset}-{output}") };
+            let out = folder.path().join(format!("{name}.png")).display().to_string();
+            let mut job = Job::new(preset);
+            job.settings.clone_from(&subject.settings);
+            if let Some((file, ..)) = &subject.input {
+                job.bind_input(&document.inputs[0].name.value, file);
             }
-        });
-
-        let out = folder.path().join(format!("{name}.png")).display().to_string();
-        let mut job = Job::new(name);
-        job.settings = settings;
-        if let (Some(input), Some(subject)) = (&input, &subject) {
-            job.bind_input(input, &subject.file);
-        }
-        job.bind_output(&document.outputs[0].0.value, &out).expect("a png");
-        session.run(&job).unwrap_or_else(|e| panic!("{name}: {e}"));
-        let got = read(&out);
-        let channels = got.channels.count();
-        let expected = match twin {
-            Some(twin) => twin.pixels.iter().flat_map(|p| stored(*p, channels)).collect(),
-            None => bytes(&got),
-        };
-        let golden = path(&format!("golden/{name}.png"));
-        if bless {
-            let bytes = expected.iter().map(|v| *v as u8).collect();
-            let target = pipe_io::Target::parse(&golden).expect("a png");
-            let options =
-                pipe_io::WriteOptions { channels: Some(got.channels), compression: Some(pipe_io::Compression::Best), ..Default::default() };
-            pipe_io::write(&target, &Picture { bytes, ..got.clone() }, &options).unwrap_or_else(|e| panic!("{e}"));
-        }
-        for (what, other) in [("its twin", &expected), ("its golden", &bytes(&read(&golden)))] {
-            let off = bytes(&got).iter().zip(other).map(|(a, b)| (a - b).abs()).max().unwrap_or(i32::MAX);
-            let count = bytes(&got).iter().zip(other).filter(|(a, b)| (*a - *b).abs() > ALLOWED).count();
-            // A value on the edge of a level may fall to either side; a few in a thousand may.
-            if bytes(&got).len() != other.len() || count * 500 > other.len() {
-                wrong.push(format!("{name} is off {what} by up to {off}, more than {ALLOWED} at {count} of {} samples", other.len()));
+            job.bind_output(output, &out).expect("a png");
+            session.run(&job).unwrap_or_else(|e| panic!("{name}: {e}"));
+            let got = read(&out);
+            let channels = got.channels.count();
+            let expected: Vec<i32> = twin.pixels.iter().flat_map(|p| stored(*p, channels)).collect();
+            let golden = path(&format!("golden/{name}.png"));
+            if bless {
+                let bytes = expected.iter().map(|v| *v as u8).collect();
+                let target = pipe_io::Target::parse(&golden).expect("a png");
+                let compression = Some(pipe_io::Compression::Best);
+                let options = pipe_io::WriteOptions { channels: Some(got.channels), compression, ..Default::default() };
+                pipe_io::write(&target, &Picture { bytes, ..got.clone() }, &options).unwrap_or_else(|e| panic!("{e}"));
+            }
+            for (what, other) in [("its twin", &expected), ("its golden", &bytes(&read(&golden)))] {
+                let off = bytes(&got).iter().zip(other).map(|(a, b)| (a - b).abs()).max().unwrap_or(i32::MAX);
+                let count = bytes(&got).iter().zip(other).filter(|(a, b)| (*a - *b).abs() > ALLOWED).count();
+                // A value on the edge of a level may fall to either side; a few in a thousand may.
+                if bytes(&got).len() != other.len() || count * 500 > other.len() {
+                    wrong.push(format!("{name} is off {what} by up to {off}, more than {ALLOWED} at {count} of {} samples", other.len()));
+                }
             }
         }
     }

@@ -1,5 +1,5 @@
-// Pixels that are not done.
+// Pixels that may be taken and are not done.
 
 fn at(i: i32) -> vec4f {
-    return vec4f(f32(params.pixels - load_score(1)));
+    return vec4f(f32(load_score(LIMIT) - load_score(ENDED)));
 }

@@ -4,7 +4,7 @@
 //
 // Free paths are drawn by the largest σt, and collisions that are none are rejected (E. Woodcock et al. 1965); on a shadow
 // ray each lowers what arrives (ratio tracking: J. Novák et al. 2014). In a homogeneous medium (UNIFORM) both are exact
-// without. Random numbers are keyed by seed, pixel and path and counted by draw.
+// without. In `score` stands what `gather.wgsl` names. Random numbers are keyed by seed, pixel and path and counted by draw.
 
 import package::lib::phase::{phase_density, scatter};
 import package::lib::random::{exponential, open_unit, philox};
@@ -28,10 +28,6 @@ struct Walk {
     hits: u32,
 }
 
-/// In `score`: pixels taken by threads, and done.
-const ISSUED = 0;
-const ENDED = 1;
-
 fn load_word(lane: i32, word: i32) -> u32 {
     return load_lanes(word * LANES + lane);
 }
@@ -53,18 +49,24 @@ fn store_word(lane: i32, word: i32, v: u32) {
     store_lanes(word * LANES + lane, v);
 }
 
+fn store_float(lane: i32, word: i32, v: f32) {
+    store_word(lane, word, bitcast<u32>(v));
+}
+
 fn store_walk(lane: i32, walk: Walk) {
-    let floats = array<f32, 10>(
-        walk.place.x, walk.place.y, walk.place.z, walk.direction.x, walk.direction.y, walk.direction.z,
-        walk.throughput, walk.found, walk.shade, walk.shade_left,
-    );
-    for (var i = 0; i < 10; i++) {
-        store_word(lane, i, bitcast<u32>(floats[i]));
+    for (var i = 0; i < 3; i++) {
+        store_float(lane, i, walk.place[i]);
+        store_float(lane, 3 + i, walk.direction[i]);
     }
-    let words = array<u32, 5>(walk.pixel, walk.path, walk.bounces, walk.draws, walk.hits);
-    for (var i = 0; i < 5; i++) {
-        store_word(lane, 10 + i, words[i]);
-    }
+    store_float(lane, 6, walk.throughput);
+    store_float(lane, 7, walk.found);
+    store_float(lane, 8, walk.shade);
+    store_float(lane, 9, walk.shade_left);
+    store_word(lane, 10, walk.pixel);
+    store_word(lane, 11, walk.path);
+    store_word(lane, 12, walk.bounces);
+    store_word(lane, 13, walk.draws);
+    store_word(lane, 14, walk.hits);
 }
 
 /// Begins the next path of the pixel.
@@ -164,7 +166,7 @@ fn advance_path(walk: ptr<function, Walk>) {
 
 fn each(lane: i32) {
     var walk = load_walk(lane);
-    let pixels = u32(params.size.x * params.size.y);
+    let pixels = load_score(LIMIT);
     var ended = 0u;
     for (var step = 0; step < STEPS; step++) {
         if walk.pixel == 0u {

@@ -1,6 +1,7 @@
 // What stands in the two tables that count photons: `tallies` for all so far, `score` for one batch. VOXELS entries come
 // first, then four words for each voxel: fluence and deposited weight, each an integer of two words, low before high. In
-// `tallies` the sum of squares of each voxel's fluence follows.
+// `tallies` the sum of squares of each voxel's fluence follows. In `score` there are BANKS sets of voxels, to be added up:
+// where voxels are few, threads would wait for each other at the same words.
 
 /// In `tallies`: photons, batches, and photons when the last batch is done.
 const PHOTONS = 0;

@@ -99,11 +99,14 @@ fn fixed_weight(w: f32) -> u32 {
     return u32(w * 268435456.0 + 0.5);
 }
 
+/// The set of voxels that this thread counts in.
+var<private> bank: i32;
+
 /// The entry of the voxel that holds a place.
 fn voxel_entry(place: vec3f) -> i32 {
     let size = params.resolution;
     let v = clamp(vec3i(floor(place)), vec3i(0), size - 1);
-    return VOXELS + 4 * ((v.z * size.y + v.y) * size.x + v.x);
+    return VOXELS + 4 * (((bank * size.z + v.z) * size.y + v.y) * size.x + v.x);
 }
 
 /// Counts fluence, in units of 2⁻²⁴.
@@ -270,6 +273,7 @@ fn collide(photon: ptr<function, Photon>, path_sigma: f32) {
 }
 
 fn each(lane: i32) {
+    bank = lane % BANKS;
     var photon = load_photon(lane);
     var ended = 0u;
     let batch = load_score(COUNT);

@@ -16,9 +16,10 @@ use pipe_graph::types::{EdgeType, Element, ImageType, VolumeType};
 use pipe_plan::lower::{Rim, lower};
 use pipe_plan::{Options, Plan};
 
+use crate::scattered;
 use crate::source::{self, bytes};
 
-const TEST_KINDS: &[Kind] = &[source::KIND];
+const TEST_KINDS: &[Kind] = &[source::KIND, scattered::KIND];
 
 /// The library with what only tests need.
 pub const REGISTRY: Registry = Registry::new(&[TEST_KINDS]);

@@ -569,23 +569,21 @@ impl Writer<'_> {
         let first = self.steps(r.first);
         let once = self.bytes_moved - before;
         let (odd, even) = (self.steps(r.odd), self.steps(r.even));
-        let times = match r.count {
-            Count::Fixed(n) | Count::Until { max: n, .. } => n,
-        };
-        self.bytes_moved = before + once * u64::from(times);
         let slot = |v: &ValueId| self.slot_of[v.0];
+        let count = match (r.count, r.until) {
+            (Count::Until { limit, every, max, .. }, Some(value)) => {
+                Times::Until { value: [slot(&value[0]), slot(&value[1])], limit, every, max }
+            }
+            (Count::Fixed(n) | Count::Until { max: n, .. }, _) => Times::Fixed(n),
+        };
+        self.bytes_moved = before + once * u64::from(count.least());
         Repeat {
             name: r.name,
             node: r.node,
             first,
             odd,
             even,
-            count: match (r.count, r.until) {
-                (Count::Until { limit, every, max, .. }, Some(value)) => {
-                    Times::Until { value: [slot(&value[0]), slot(&value[1])], limit, every, max }
-                }
-                (Count::Fixed(n) | Count::Until { max: n, .. }, _) => Times::Fixed(n),
-            },
+            count,
             settle: r.settle.iter().map(|(from, to)| (slot(from), slot(to))).collect(),
         }
     }

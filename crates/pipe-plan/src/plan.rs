@@ -167,6 +167,16 @@ pub enum Times {
     },
 }
 
+impl Times {
+    /// Iterations that are sure to run: all of a fixed number, those before the first check otherwise.
+    pub fn least(&self) -> u32 {
+        match *self {
+            Self::Fixed(n) => n,
+            Self::Until { every, max, .. } => every.min(max),
+        }
+    }
+}
+
 /// One thing that happens.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Step {
@@ -236,6 +246,6 @@ pub struct Plan {
     pub peak_bytes: u64,
     /// What it would take without sharing.
     pub naive_bytes: u64,
-    /// Bytes that all steps read and write.
+    /// Bytes that all steps read and write; a loop that ends by a value counts up to its first check.
     pub bytes_moved: u64,
 }

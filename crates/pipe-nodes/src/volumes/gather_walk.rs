@@ -21,7 +21,8 @@ use crate::shader;
 #[derive(Debug, SmartDefault, Serialize, Deserialize, JsonSchema)]
 #[serde(default)]
 pub(super) struct GatherWalk {
-    /// What light travels through: `Homogeneous(sigma_t)`, a Volume of σt, or `CloudChamber(density_scale)`.
+    /// What light travels through: `Homogeneous(sigma_t)`, a Volume of σt, `Scaled(volume, sigma_t)` or
+    /// `CloudChamber(density_scale)`.
     #[default(medium::homogeneous())]
     medium: Medium,
     /// Where light comes from: `Point([x, y, z])` or `Plane(origin, normal, size)`.
@@ -63,6 +64,9 @@ pub(super) const KIND: Kind = Kind::of::<GatherWalk>(
 /// Words that a lane keeps.
 const LANE: u32 = 15;
 
+/// Words of `score`: see `gather.wgsl`.
+const SCORE: u32 = 3;
+
 /// More steps than the walks of a pixel should take.
 const MOST_STEPS: u64 = 1 << 36;
 
@@ -83,24 +87,33 @@ impl Node for GatherWalk {
         let size = cx.image_of(out).size;
         let pixels = size[0] * size[1];
         let dispatches = Dispatches::new(cx.limits().profile, pixels);
-        let tables = [LANE * dispatches.lanes, 2, 2 * pixels];
-        let begin = [("lanes", Shape::uints(tables[0])), ("score", Shape::uints(tables[1])), ("pixels", Shape::floats(tables[2]))];
-        let begin = begin.map(|(name, shape)| {
+        let tables =
+            [("lanes", Shape::uints(LANE * dispatches.lanes)), ("score", Shape::uints(SCORE)), ("pixels", Shape::floats(2 * pixels))];
+        let begin = tables.map(|(name, shape)| {
             let zeros = cx.intermediate(name, shape);
             let ty = if name == "pixels" { "f32" } else { "u32" };
             let text = format!("fn at(i: i32) -> {ty} {{ return {ty}(0); }}");
             cx.pass(name, Shader::builtin("volumes/gather_walk.wgsl", &text)).write("out", zeros).add();
             zeros
         });
-        let left = cx.intermediate("left", Shape::Scalar);
-        let done = cx.repeat("walks", dispatches.until(left, pixels, MOST_STEPS), &begin, |cx, states| {
-            let walked = self.walk(cx, &inside, &dispatches, [states[0], states[1], states[2]], size);
-            cx.pass("left", shader!("volumes/gather_left"))
-                .read("score", walked[1], Reach::Whole)
-                .write("out", left)
+        // Slices are what progress counts; each is enough work for all threads.
+        let slices = (pixels / (4 * dispatches.lanes)).clamp(1, 16);
+        let slice = pixels.div_ceil(slices);
+        let done = cx.repeat("", Count::Fixed(slices), &begin, |cx, states| {
+            let score = cx.intermediate("score", Shape::uints(SCORE));
+            cx.pass("slice", naming(&shader!("volumes/gather_slice")))
+                .entry(Entry::Each)
+                .grid(Grid::Elements([1, 1, 1]))
+                .write_as("score", score, Access::Update, Some(states[1]))
+                .param("slice", slice)
                 .param("pixels", pixels)
                 .add();
-            Ok(walked.to_vec())
+            let left = cx.intermediate("left", Shape::Scalar);
+            cx.repeat("walks", dispatches.until(left, slice, MOST_STEPS), &[states[0], score, states[2]], |cx, states| {
+                let walked = self.walk(cx, &inside, &dispatches, [states[0], states[1], states[2]], size);
+                cx.pass("left", naming(&shader!("volumes/gather_left"))).read("score", walked[1], Reach::Whole).write("out", left).add();
+                Ok(walked.to_vec())
+            })
         })?;
         cx.pass("", shader!("volumes/gather_picture")).read("pixels", done[2], Reach::Whole).write("out", out).add();
         Ok(())
@@ -120,6 +133,11 @@ impl Node for GatherWalk {
     }
 }
 
+/// A shader with the names of `gather.wgsl`.
+fn naming(shader: &Shader) -> Shader {
+    Shader::builtin(&shader.path, &format!("{}\n{}", shader.source, shader!("volumes/gather").source))
+}
+
 impl GatherWalk {
     /// One dispatch.
     fn walk(
@@ -136,7 +154,7 @@ impl GatherWalk {
             cx.intermediate("walked", shape)
         });
         let pass = inside
-            .pass(cx, "walk", &shader!("volumes/gather_walk"), &[shader!("volumes/arrival")])
+            .pass(cx, "walk", &shader!("volumes/gather_walk"), &[shader!("volumes/gather"), shader!("volumes/arrival")])
             .entry(Entry::Each)
             .grid(Grid::Elements([dispatches.lanes, 1, 1]))
             .write_as("lanes", next[0], Access::Update, Some(states[0]))

@@ -71,7 +71,7 @@ impl Phase {
                 let root = (half.abs() + (half * half + 1.0).sqrt()).cbrt();
                 (root - 1.0 / root).copysign(half)
             }
-            Self::HenyeyGreenstein { g } if g == 0.0 => 2.0 * u - 1.0,
+            Self::HenyeyGreenstein { g: 0.0 } => 2.0 * u - 1.0,
             Self::HenyeyGreenstein { g } => {
                 let g = f64::from(g);
                 let inner = (1.0 - g * g) / (1.0 - g + 2.0 * g * u);

@@ -34,7 +34,8 @@ use crate::shader;
 #[derive(Debug, SmartDefault, Serialize, Deserialize, JsonSchema)]
 #[serde(default)]
 pub(super) struct PhotonScatter {
-    /// What light travels through: `Homogeneous(sigma_t)`, a Volume of σt, or `CloudChamber(density_scale)`.
+    /// What light travels through: `Homogeneous(sigma_t)`, a Volume of σt, `Scaled(volume, sigma_t)` or
+    /// `CloudChamber(density_scale)`.
     #[default(medium::homogeneous())]
     medium: Medium,
     /// Voxels of the results: a number, or [x, y, z].
@@ -53,9 +54,9 @@ pub(super) struct PhotonScatter {
     /// Where photons begin: `Point([x, y, z])`, `Beam(origin, direction)` or `Plane(origin, normal, size)`. From outside
     /// of the cube they travel straight to it; those that miss it have escaped.
     light: Light,
-    /// Weight from which on a photon is absorbed as a whole or not at all.
+    /// Weight from which on a photon is absorbed as a whole or not at all; 0: never.
     #[default = 0.001]
-    #[schemars(range(min = 1e-6, max = 1.0))]
+    #[schemars(range(min = 0.0, max = 1.0))]
     min_energy: f32,
     /// What happens at the faces of the cube.
     boundary: Boundary,
@@ -128,7 +129,7 @@ pub(super) const KIND: Kind = Kind::of::<PhotonScatter>(
         r#"PhotonScatter(medium: Homogeneous(2), resolution: [2, 5, 3], photons: 120, phase: HenyeyGreenstein(0.75), boundary: PeriodicXZ, light: Plane([0.5, 1, 0.5], [0, -1, 0], 1), estimator: TrackLength, seed: 3)"#,
         r#"PhotonScatter(medium: "fog", resolution: 4, photons: 100, phase: Rayleigh, light: Beam([-0.2, 0.4, 0.3], [1, 0.1, 0.2]), tracking: Delta)"#,
         r#"PhotonScatter(medium: CloudChamber, resolution: 4, photons: 60, tracking: Delta, random: Tausworthe, min_energy: 0.5)"#,
-        r#"PhotonScatter(medium: "fog", resolution: 3, photons: 60, albedo: 0.5, step: 0.02, estimator: TrackLength, random: Tausworthe)"#,
+        r#"PhotonScatter(medium: Scaled("fog", 2), resolution: 3, photons: 60, albedo: 0.5, step: 0.02, estimator: TrackLength, random: Tausworthe)"#,
     ],
 )
 .ports(&[
@@ -147,6 +148,9 @@ pub(super) const KIND: Kind = Kind::of::<PhotonScatter>(
 
 /// Words of `tallies` and `score` before the voxels, and where they stand: see `photon.wgsl`.
 const VOXELS: u32 = 20;
+
+/// Up to so many voxels in all there are several sets of them.
+const MOST_BANKED: u32 = 16384;
 
 /// Words that a lane keeps.
 const LANE: u32 = 15;
@@ -255,8 +259,13 @@ impl PhotonScatter {
         self.resolution.size().iter().product()
     }
 
+    /// Sets of voxels that threads count in: several where voxels are few.
+    fn banks(&self) -> u32 {
+        (MOST_BANKED / self.voxels()).clamp(1, 64)
+    }
+
     fn score_len(&self) -> u32 {
-        VOXELS + 4 * self.voxels()
+        VOXELS + 4 * self.voxels() * self.banks()
     }
 
     fn tallies_len(&self) -> u32 {
@@ -309,6 +318,7 @@ impl PhotonScatter {
             .grid(Grid::Elements([self.voxels() + 1, 1, 1]))
             .read("score", walked[1], Reach::Whole)
             .write_as("tallies", next, Access::Update, Some(tallies))
+            .constant("BANKS", self.banks() as i32)
             .param("voxels", self.voxels() as i32)
             .add();
         Ok(next)
@@ -330,6 +340,7 @@ impl PhotonScatter {
             .write_as("lanes", walked[0], Access::Update, Some(lanes))
             .write_as("score", walked[1], Access::AtomicUpdate, Some(score))
             .constant("LANES", dispatches.lanes as i32)
+            .constant("BANKS", self.banks() as i32)
             .constant("STEPS", dispatches.steps as i32)
             .constant("PERIODIC", self.boundary == Boundary::PeriodicXZ)
             .constant("TRACK", self.estimator == Estimator::TrackLength)

@@ -197,10 +197,9 @@ impl Walk<'_> {
         let way = |axis: usize| {
             let (size, d) = (f64::from(self.size[axis]), direction[axis]);
             // A place within rounding of a face is on it.
-            let face = match d > 0.0 {
-                true => (place[axis] * size + 1e-9).floor() + 1.0,
-                false => (place[axis] * size - 1e-9).ceil() - 1.0,
-            };
+            let next = (place[axis] * size + 1e-9).floor() + 1.0;
+            let last = (place[axis] * size - 1e-9).ceil() - 1.0;
+            let face = if d > 0.0 { next } else { last };
             if d == 0.0 { f64::INFINITY } else { (face / size - place[axis]) / d }
         };
         way(0).min(way(1)).min(way(2))

@@ -17,7 +17,8 @@ use crate::shader;
 #[derive(Debug, SmartDefault, Serialize, Deserialize, JsonSchema)]
 #[serde(default)]
 pub(super) struct SingleScatter {
-    /// What light travels through: `Homogeneous(sigma_t)`, a Volume of σt, or `CloudChamber(density_scale)`.
+    /// What light travels through: `Homogeneous(sigma_t)`, a Volume of σt, `Scaled(volume, sigma_t)` or
+    /// `CloudChamber(density_scale)`.
     #[default(medium::homogeneous())]
     medium: Medium,
     /// Where light comes from: `Point([x, y, z])` or `Plane(origin, normal, size)`.

@@ -20,7 +20,8 @@ use crate::shader;
 pub(super) struct VolumeRadiance {
     /// Power through a small sphere by the area of its cross-section; interpolated linearly between voxels.
     fluence: In<Volume>,
-    /// What light travels through: `Homogeneous(sigma_t)`, a Volume of σt, or `CloudChamber(density_scale)`.
+    /// What light travels through: `Homogeneous(sigma_t)`, a Volume of σt, `Scaled(volume, sigma_t)` or
+    /// `CloudChamber(density_scale)`.
     #[default(medium::homogeneous())]
     medium: Medium,
     /// Where the picture is taken.

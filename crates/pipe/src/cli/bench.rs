@@ -9,7 +9,7 @@ use pipe::run::{Decoded, Inputs, Job, Report, Session, input_kinds, request};
 use pipe_graph::types::EdgeKind;
 use pipe_io::volume::{Volume, Voxel};
 use pipe_io::{Alpha, Channels, Colour, Layout, Metadata, Picture, Primaries, Sample, Transfer};
-use pipe_plan::plan::{Run, Step, Times};
+use pipe_plan::plan::{Run, Step};
 use serde_json::{Value, json};
 
 use super::args::{self, BenchArgs};
@@ -102,7 +102,7 @@ fn one(session: &mut Session, a: &BenchArgs, size: [u32; 2]) -> Result<Value, Fa
     }))
 }
 
-/// Bytes of each pass over a whole run.
+/// Bytes of each pass over a whole run; a loop that ends by a value counts up to its first check.
 fn collect(steps: &[Step], times: u64, passes: &mut IndexMap<String, (Vec<String>, u64)>) {
     for step in steps {
         match step {
@@ -110,10 +110,7 @@ fn collect(steps: &[Step], times: u64, passes: &mut IndexMap<String, (Vec<String
                 passes.entry(name.clone()).or_insert_with(|| (nodes.clone(), 0)).1 += bytes * times;
             }
             Step::Repeat(r) => {
-                let n = match r.count {
-                    Times::Fixed(n) | Times::Until { max: n, .. } => n,
-                };
-                collect(&r.first, times * u64::from(n), passes);
+                collect(&r.first, times * u64::from(r.count.least()), passes);
             }
         }
     }
