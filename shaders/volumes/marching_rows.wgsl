@@ -1,46 +1,62 @@
-// What both walks of marching cubes share. A thread walks the points (x, y, z) of one row along x; its cells lie between
-// four rows, numbered by y + 2z: 0 its own. To know the edges that the voxels of these four own, it also looks at the
-// rows behind them: 4 (y+2, z), 5 (y+2, z+1), 6 (y, z+2), 7 (y+1, z+2).
+// What both walks of marching cubes share. A thread walks the words of one row (y, z), 32 points along x at a time; its cells
+// lie between four rows, numbered by y + 2z: 0 its own. To know the edges that the points of these four own, it also looks
+// at the rows behind them: 4 (y+2, z), 5 (y+2, z+1), 6 (y, z+2), 7 (y+1, z+2).
+
+/// The inside points of the eight rows in one word of each.
+struct Words {
+    near: vec4u,
+    high: vec2u,
+    deep: vec2u,
+}
 
 fn row_place(row: i32) -> vec2i {
     return vec2i(row % params.points.y, row / params.points.y);
 }
 
-/// Whether a point is inside, as bit `number`.
-fn inside(x: i32, yz: vec2i, number: u32) -> u32 {
-    let p = vec3i(min(x, params.points.x - 1), min(yz, params.points.yz - 1));
-    return select(0u, 1u << number, load_volume(p - PAD).r >= params.iso);
+/// A word of a row. Behind the last row it stands again, behind the last word of a row its last point.
+fn word(w: i32, yz: vec2i) -> u32 {
+    let at = min(yz, params.points.yz - 1);
+    let bits = load_inside((at.y * params.points.y + at.x) * ROW_WORDS + min(w, ROW_WORDS - 1));
+    return select(u32(bitcast<i32>(bits) >> 31u), bits, w < ROW_WORDS);
 }
 
-/// The inside points of the eight rows at x, as bits. Beyond the last point or row the last one stands again, so that no
-/// edge crosses the surface there.
-fn insides(x: i32, yz: vec2i) -> u32 {
-    let near = inside(x, yz, 0u) | inside(x, yz + vec2i(1, 0), 1u) | inside(x, yz + vec2i(0, 1), 2u) | inside(x, yz + vec2i(1, 1), 3u);
-    let high = inside(x, yz + vec2i(2, 0), 4u) | inside(x, yz + vec2i(2, 1), 5u);
-    return near | high | inside(x, yz + vec2i(0, 2), 6u) | inside(x, yz + vec2i(1, 2), 7u);
+fn near_words(w: i32, yz: vec2i) -> vec4u {
+    return vec4u(word(w, yz), word(w, yz + vec2i(1, 0)), word(w, yz + vec2i(0, 1)), word(w, yz + vec2i(1, 1)));
 }
 
-/// For the points of rows 0 to 3 at some x: which of their edges along x, y, z cross the surface, as bits.
-fn owned(here: u32, next: u32) -> vec4u {
-    let own = vec4u(here, here >> 1u, here >> 2u, here >> 3u);
-    let along_x = own ^ vec4u(next, next >> 1u, next >> 2u, next >> 3u);
-    let along_y = own ^ vec4u(here >> 1u, here >> 4u, here >> 3u, here >> 5u);
-    let along_z = own ^ vec4u(here >> 2u, here >> 3u, here >> 6u, here >> 7u);
-    return (along_x & vec4u(1u)) | ((along_y & vec4u(1u)) << vec4u(1u)) | ((along_z & vec4u(1u)) << vec4u(2u));
+fn words(w: i32, yz: vec2i) -> Words {
+    let high = vec2u(word(w, yz + vec2i(2, 0)), word(w, yz + vec2i(2, 1)));
+    return Words(near_words(w, yz), high, vec2u(word(w, yz + vec2i(0, 2)), word(w, yz + vec2i(1, 2))));
 }
 
-/// Bits 0 to 3 at places 0, 2, 4 and 6.
-fn spread(bits: u32) -> u32 {
-    let pairs = ((bits & 0xfu) | (bits << 2u)) & 0x33u;
-    return (pairs | (pairs << 1u)) & 0x55u;
+/// The points one further along x.
+fn shifted(here: vec4u, next: vec4u) -> vec4u {
+    return (here >> vec4u(1u)) | (next << vec4u(31u));
 }
 
-/// Where the case of the cell between two points begins in the table: bit x + 2·row of the case is a corner.
-fn case_at(here: u32, next: u32) -> i32 {
-    return i32(spread(here) | (spread(next) << 1u)) * STRIDE;
+/// The lowest `n` bits, all for 32 and more.
+fn lowest(n: i32) -> u32 {
+    return select((1u << u32(clamp(n, 0, 31))) - 1u, 0xffffffffu, n > 31);
 }
 
-/// Whether a row has cells.
-fn has_cells(yz: vec2i) -> bool {
-    return all(yz + 1 < params.points.yz);
+/// The points of a word that there are.
+fn points_of(w: i32) -> u32 {
+    return lowest(params.points.x - 32 * w);
+}
+
+/// The cells that begin in a word, and that the surface crosses: their corners are not all alike.
+fn crossed_cells(w: i32, yz: vec2i, near: vec4u, far: vec4u) -> u32 {
+    if any(yz + 1 >= params.points.yz) {
+        return 0u;
+    }
+    let differs = (near ^ vec4u(near.x)) | (far ^ vec4u(near.x));
+    return (differs.x | differs.y | differs.z | differs.w) & lowest(params.points.x - 1 - 32 * w);
+}
+
+/// Where the case of a cell begins in the table: bit x + 2·row of the case is a corner.
+fn case_at(near: vec4u, far: vec4u, bit: u32) -> i32 {
+    let n = (near >> vec4u(bit)) & vec4u(1u);
+    let f = (far >> vec4u(bit)) & vec4u(1u);
+    let corners = (n << vec4u(0u, 2u, 4u, 6u)) | (f << vec4u(1u, 3u, 5u, 7u));
+    return i32(corners.x | corners.y | corners.z | corners.w) * STRIDE;
 }

@@ -1,11 +1,13 @@
 //! `MarchingCubes`: the surface where a volume reaches a density, as a mesh.
 //!
-//! One thread walks one row of cells along x, twice: first it counts the row's vertices and triangles, then, with the sums of
-//! all rows before it, it stores them (the rows of W. Schroeder, R. Maynard, B. Geveci, Flying Edges, 2015). A vertex
-//! belongs to the voxel at the lower end of its edge, so a thread knows the vertices of its neighbours' rows by counting
-//! along them, and nothing of the size of the volume is stored between passes.
+//! First every point of the lattice becomes a bit, inside or not; that is the only pass that reads the whole volume. Then one
+//! thread walks one row of cells along x, 32 at a time, twice: it counts the row's vertices and triangles, and, with the sums
+//! of all rows before it, it stores them (the rows of W. Schroeder, R. Maynard, B. Geveci, Flying Edges, 2015). Crossed edges
+//! are exclusive ors of words, and their numbers are counts of bits: a vertex belongs to the point at the lower end of its
+//! edge, so a thread knows the numbers of its neighbours' vertices without anyone having stored them.
 
 use glam::DVec3;
+use pipe_graph::lowering::PassBuilder;
 use pipe_graph::prelude::*;
 use smart_default::SmartDefault;
 
@@ -25,8 +27,8 @@ pub(super) struct MarchingCubes {
     /// The density of the surface.
     #[default(0.5.into())]
     iso: Driven,
-    /// Room for so many triangles; absent: for what smooth surfaces need, at least 262,144. A mesh that needs more is an
-    /// error that says how many.
+    /// Room for so many triangles; absent: for what smooth surfaces need, at least 262,144, if the device can hold it. A mesh
+    /// that needs more is an error that says how many.
     #[schemars(range(min = 1, max = 178956970))]
     max_triangles: Option<u32>,
     /// Lengths of the volume's edges in the mesh: positions run from 0 to these.
@@ -65,15 +67,46 @@ impl Lattice {
         self.points[1] * self.points[2]
     }
 
+    /// Words of 32 points in a row.
+    fn row_words(&self) -> u32 {
+        self.points[0].div_ceil(32)
+    }
+
+    /// What every pass knows.
+    fn describe<'b, 'a>(&self, pass: PassBuilder<'b, 'a>) -> PassBuilder<'b, 'a> {
+        pass.param("points", self.points.map(|n| n as i32)).constant("ROW_WORDS", self.row_words() as i32)
+    }
+
+    /// A pass of one thread a row.
+    fn walk<'b, 'a>(&self, pass: PassBuilder<'b, 'a>, inside: ResourceId, cases: ResourceId) -> PassBuilder<'b, 'a> {
+        self.describe(pass)
+            .entry(Entry::Each)
+            .grid(Grid::Elements([self.rows(), 1, 1]))
+            .read("inside", inside, Reach::Whole)
+            .read("cases", cases, Reach::Whole)
+            .constant("STRIDE", STRIDE as i32)
+    }
+
     /// Room for a mesh: vertices and triangles.
     fn room(&self, asked: Option<u32>) -> MeshType {
         let [x, y, z] = self.points.map(u64::from);
         let cells = (x - 1) * (y - 1) * (z - 1);
-        let smooth = 32 * (x * y + y * z + z * x);
+        let smooth = 16 * (x * y + y * z + z * x);
         let triangles = asked.map_or(smooth.max(LEAST_ROOM), u64::from).min(5 * cells).clamp(1, u64::from(u32::MAX) / 24);
         let vertices = triangles.max(LEAST_ROOM).min(3 * x * y * z);
         MeshType { max_vertices: vertices as u32, max_triangles: triangles as u32 }
     }
+}
+
+/// A walk with what both walks share.
+fn with_rows(shader: &Shader) -> Shader {
+    Shader::builtin(&shader.path, &format!("{}\n{}", shader.source, shader!("volumes/marching_rows").source))
+}
+
+/// As much of the room as buffers of this size hold.
+fn within(room: MeshType, bytes: u64) -> MeshType {
+    let most = |each: u64| u32::try_from(bytes / each).unwrap_or(u32::MAX);
+    MeshType { max_vertices: room.max_vertices.min(most(24)), max_triangles: room.max_triangles.min(most(12)) }
 }
 
 impl Node for MarchingCubes {
@@ -96,31 +129,21 @@ impl Node for MarchingCubes {
             unreachable!("the resolver bound a volume, and `outputs` has declared a mesh")
         };
         let lattice = Lattice::new(ty.size, border);
+        let room = if self.max_triangles.is_none() { within(room, cx.limits().max_binding_bytes) } else { room };
         let cases = cx.uints("cases", &cube_table::words());
-        let pass = |cx: &mut Lowering<'_>, name: &str, source: Shader, reads: &[(&str, ResourceId)], writes: &[(&str, ResourceId)]| {
-            let rows = format!("{}\n{}", source.source, shader!("volumes/marching_rows").source);
-            let mut pass = cx
-                .pass(name, Shader::builtin(&source.path, &rows))
-                .entry(Entry::Each)
-                .grid(Grid::Elements([lattice.rows(), 1, 1]))
-                .read_with("volume", volume, Reach::Whole, border, Filter::Linear)
-                .read("cases", cases, Reach::Whole)
-                .driven("iso", &self.iso)
-                .param("extent", self.extent)
-                .param("points", lattice.points.map(|n| n as i32))
-                .constant("PAD", lattice.pad as i32)
-                .constant("STRIDE", STRIDE as i32);
-            for (port, id) in reads {
-                pass = pass.read(port, *id, Reach::Whole);
-            }
-            for (port, id) in writes {
-                pass = pass.write(port, *id);
-            }
-            pass.add();
-        };
+        let inside = cx.intermediate("inside", Shape::uints(lattice.row_words() * lattice.rows()));
+        let bits = cx.pass("inside", shader!("volumes/marching_inside"));
+        lattice
+            .describe(bits)
+            .read_with("volume", volume, Reach::Whole, border, Filter::Nearest)
+            .write("out", inside)
+            .driven("iso", &self.iso)
+            .constant("PAD", lattice.pad as i32)
+            .add();
         let table = Shape::uints(lattice.rows());
         let (vertices, triangles) = (cx.intermediate("row_vertices", table), cx.intermediate("row_triangles", table));
-        pass(cx, "count", shader!("volumes/marching_count"), &[], &[("vertices", vertices), ("triangles", triangles)]);
+        let count = cx.pass("count", with_rows(&shader!("volumes/marching_count")));
+        lattice.walk(count, inside, cases).write("vertices", vertices).write("triangles", triangles).add();
         let vertex_sums = scan(cx, "vertex_sums", vertices, true, FAST_RADIX);
         let triangle_sums = scan(cx, "triangle_sums", triangles, true, FAST_RADIX);
         let parts = MeshParts {
@@ -128,9 +151,18 @@ impl Node for MarchingCubes {
             triangles: cx.intermediate("triangles", Shape::uints(3 * room.max_triangles)),
             counts: cx.intermediate("counts", Shape::uints(2)),
         };
-        let sums = [("vertex_sums", vertex_sums), ("triangle_sums", triangle_sums)];
-        let mesh = [("vertices", parts.vertices), ("triangles", parts.triangles)];
-        pass(cx, "emit", with_gradient(&shader!("volumes/marching_emit")), &sums, &mesh);
+        let emit = cx.pass("emit", with_gradient(&with_rows(&shader!("volumes/marching_emit"))));
+        lattice
+            .walk(emit, inside, cases)
+            .read_with("volume", volume, Reach::Whole, border, Filter::Linear)
+            .read("vertex_sums", vertex_sums, Reach::Whole)
+            .read("triangle_sums", triangle_sums, Reach::Whole)
+            .write("vertices", parts.vertices)
+            .write("triangles", parts.triangles)
+            .driven("iso", &self.iso)
+            .param("extent", self.extent)
+            .constant("PAD", lattice.pad as i32)
+            .add();
         cx.pass("total", shader!("volumes/marching_total"))
             .read("vertex_sums", vertex_sums, Reach::Whole)
             .read("triangle_sums", triangle_sums, Reach::Whole)
