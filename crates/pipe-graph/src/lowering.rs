@@ -333,9 +333,16 @@ impl PassBuilder<'_, '_> {
         self.read_with(port, resource, reach, border, filter)
     }
 
+    /// An input of which the whole pass loads each element at most once, in whatever order.
+    pub fn read_once(mut self, port: &str, resource: ResourceId) -> Self {
+        let (border, filter) = (self.cx.border, self.cx.filter);
+        self.pass.reads.push(Read { port: port.to_owned(), resource, reach: Reach::Whole, once: true, border, filter });
+        self
+    }
+
     /// An input whose border policy and filter belong to the node's meaning.
     pub fn read_with(mut self, port: &str, resource: ResourceId, reach: Reach, border: Border, filter: Filter) -> Self {
-        self.pass.reads.push(Read { port: port.to_owned(), resource, reach, border, filter });
+        self.pass.reads.push(Read { port: port.to_owned(), resource, reach, once: reach == Reach::Point, border, filter });
         self
     }
 

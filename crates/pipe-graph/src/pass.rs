@@ -172,6 +172,9 @@ pub struct Read {
     pub resource: ResourceId,
     /// How far around.
     pub reach: Reach,
+    /// Whether the whole pass loads each element at most once, as reductions do; so that what makes the elements may be
+    /// computed in its place.
+    pub once: bool,
     /// What lies outside.
     pub border: Border,
     /// How `sample_NAME` interpolates.

@@ -496,6 +496,7 @@ fn copy_pass(l: &LoopOp, from: ResourceId, to: ResourceId, ops: &Ops) -> KernelP
         source: Source::Read(0),
         shape,
         reach,
+        once: true,
         border: pipe_graph::pass::Border::Clamp,
         filter: pipe_graph::pass::Filter::Nearest,
     };

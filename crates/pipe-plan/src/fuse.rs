@@ -5,9 +5,13 @@
 //! - P computes pixel by pixel (`Point`) with a single result, and only C needs r (it is neither fetched, kept, a loop's
 //!   state, nor read elsewhere): so r need never exist;
 //! - C reads r at few places for each pixel that it makes: the same one (`Point`), or a small neighbourhood when P costs
-//!   next to nothing. What a row of taps would recompute again and again is better stored once;
+//!   next to nothing, or loads each place once, as a reduction does. What a row of taps would recompute again and again is
+//!   better stored once;
 //! - r is stored in full precision: a half-float image that the user asked for rounds its values, and goes on to;
 //! - the kernel stays within the device's bindings.
+//!
+//! A value that few passes need, each at the same pixel, is computed in each of them when that moves fewer bytes than
+//! storing it: the pixels of a file are decoded again rather than kept as floats.
 //!
 //! Point passes that share an input, or that feed several Point passes, are put side by side into one kernel with
 //! several outputs, when no way leads from one to the other through a pass outside. So chains, trees and diamonds of
@@ -25,6 +29,10 @@ use crate::kernel_pass::{KernelPass, LoopOp, Op, Ops, Source};
 
 /// Most loads that a stencil may make of a value that is computed anew for each.
 const MOST_TAPS: u32 = 9;
+
+/// Most consumers that compute a value anew, each for itself, and most stages that they repeat.
+const MOST_COPIES: u64 = 3;
+const MOST_REPEATED: usize = 2;
 
 /// Most stages of one kernel: beyond, registers run out before bandwidth does.
 const MOST_STAGES: usize = 24;
@@ -55,6 +63,8 @@ fn region(list: Vec<Op>, ops: &Ops, outside: &BTreeSet<ResourceId>, limits: &Lim
         })
         .collect();
     let mut fusion = Fusion { list: share_equal(list, outside, log), ops, outside, limits, log };
+    while fusion.fold_one() {}
+    while fusion.fold_into_all() {}
     while fusion.fold_one() {}
     while fusion.join_one() {}
     // What was joined may have become foldable.
@@ -177,6 +187,39 @@ impl Fusion<'_> {
         false
     }
 
+    /// Puts one producer into each of its few consumers, where computing it anew moves no more bytes than storing it and
+    /// loading it again; `false` when there is none left.
+    fn fold_into_all(&mut self) -> bool {
+        for p in 0..self.list.len() {
+            let Some(producer) = self.pass(p) else { continue };
+            let Some(result) = foldable(producer, self.ops) else { continue };
+            let readers = self.readers(result);
+            let copies = readers.len() as u64;
+            if self.outside.contains(&result) || !(2..=MOST_COPIES).contains(&copies) || producer.stages.len() > MOST_REPEATED {
+                continue;
+            }
+            let read: u64 = producer.reads.iter().map(|r| self.ops.shape(*r).bytes()).sum();
+            let stored = self.ops.shape(result).bytes();
+            if copies * read > read + stored + copies * stored {
+                continue;
+            }
+            let fused = |c: &usize| {
+                let consumer = self.pass(*c)?;
+                let may = taps(consumer, result) == Ok(1) && self.may_fold(producer, consumer, result).is_ok();
+                may.then(|| fold(producer, consumer, result)).filter(|fused| within_limits(fused, self.ops, self.limits))
+            };
+            let Some(fused) = readers.iter().map(fused).collect::<Option<Vec<_>>>() else { continue };
+            let names: Vec<_> = readers.iter().filter_map(|c| self.pass(*c)).map(|c| c.name.clone()).collect();
+            self.note(format!("{} is computed inside {}: that moves fewer bytes than storing it", producer.name, names.join(" and ")));
+            for (c, pass) in readers.into_iter().zip(fused) {
+                self.list[c] = Op::Pass(pass);
+            }
+            self.list.remove(p);
+            return true;
+        }
+        false
+    }
+
     fn note(&mut self, text: String) {
         if !self.log.contains(&text) {
             self.log.push(text);
@@ -193,15 +236,7 @@ impl Fusion<'_> {
         if consumer.last().entry == Entry::Points {
             return Err("points are drawn from stored images".into());
         }
-        let at = consumer.reads.iter().position(|r| *r == result).ok_or("it is read by a parameter only")?;
-        let mut taps = 0;
-        for port in consumer.stages.iter().flat_map(|s| &s.ports).filter(|p| p.source == Source::Read(at)) {
-            taps += match port.reach {
-                Reach::Point => 1,
-                Reach::Around(x, y) => (2 * x + 1).saturating_mul(2 * y + 1),
-                Reach::Whole => return Err("it is read from anywhere".into()),
-            };
-        }
+        let taps = taps(consumer, result)?;
         // Ports apply their border before they ask for a value, so a producer is never asked for one outside.
         // Decoding a file's words or looking into a table is not next to nothing.
         let ports = || producer.stages.iter().flat_map(|s| &s.ports);
@@ -271,6 +306,20 @@ impl Fusion<'_> {
         let own = self.list[a].results();
         (a + 1..b).any(|i| self.list[i].sources().iter().any(|s| own.contains(s)))
     }
+}
+
+/// At how many places a pass loads a value for each that it makes (or that there is, when it loads each once).
+fn taps(consumer: &KernelPass, result: ResourceId) -> Result<u32, String> {
+    let at = consumer.reads.iter().position(|r| *r == result).ok_or("it is read by a parameter only")?;
+    consumer.stages.iter().flat_map(|s| &s.ports).filter(|p| p.source == Source::Read(at)).try_fold(0_u32, |taps, port| {
+        let more = match port.reach {
+            Reach::Point => 1,
+            Reach::Around(x, y) => (2 * x + 1).saturating_mul(2 * y + 1),
+            Reach::Whole if port.once => 1,
+            Reach::Whole => return Err("it is read from anywhere".to_owned()),
+        };
+        Ok(taps.saturating_add(more))
+    })
 }
 
 /// Whether a pass is made of Point stages only.

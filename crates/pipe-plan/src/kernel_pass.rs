@@ -26,6 +26,7 @@ pub(crate) struct StagePort {
     pub(crate) source: Source,
     pub(crate) shape: Shape,
     pub(crate) reach: Reach,
+    pub(crate) once: bool,
     pub(crate) border: Border,
     pub(crate) filter: Filter,
 }
@@ -88,6 +89,7 @@ impl KernelPass {
                 source: Source::Read(at),
                 shape: graph.resource(read.resource).shape,
                 reach: read.reach,
+                once: read.once,
                 border: read.border,
                 filter: read.filter,
             }

@@ -76,7 +76,7 @@ pub(crate) fn count(cx: &mut Lowering<'_>, suffix: &str, image: ResourceId, binn
     let pass = cx
         .pass(suffix, shader)
         .entry(Entry::Kernel)
-        .read("image", image, Reach::Whole)
+        .read_once("image", image)
         .write_as("counts", counts, Access::Atomic, None)
         .constant("PRIVATE", binning.bins <= PRIVATE)
         .constant("SLOTS", binning.bins.min(PRIVATE));

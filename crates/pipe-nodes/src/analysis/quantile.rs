@@ -38,7 +38,7 @@ pub(crate) fn quantiles(cx: &mut Lowering<'_>, suffix: &str, image: ResourceId, 
         let pass = cx
             .pass(&format!("{suffix}.count{round}"), shader!("analysis/quantile_count"))
             .entry(Entry::Kernel)
-            .read("image", image, Reach::Whole)
+            .read_once("image", image)
             .read("state", found, Reach::Whole)
             .write_as("counts", counts, Access::Atomic, None)
             .constant("VIEW", view as i32)
@@ -61,7 +61,7 @@ pub(crate) fn quantiles(cx: &mut Lowering<'_>, suffix: &str, image: ResourceId, 
     let pass = cx
         .pass(&format!("{suffix}.next"), shader!("analysis/quantile_next"))
         .entry(Entry::Kernel)
-        .read("image", image, Reach::Whole)
+        .read_once("image", image)
         .read("state", found, Reach::Whole)
         .write_as("above", above, Access::Atomic, None)
         .constant("VIEW", view as i32);

@@ -91,7 +91,7 @@ impl Sums {
         let pass = cx
             .pass(&tiles, extended(&shader!("analysis/sum"), tail))
             .entry(Entry::Kernel)
-            .read("image", image, Reach::Whole)
+            .read_once("image", image)
             .write("partials", partials)
             .constant("VIEW", view as i32)
             .constant("MEASURE", self.measure)
@@ -132,7 +132,7 @@ pub(crate) fn extent(cx: &mut Lowering<'_>, suffix: &str, image: ResourceId, vie
     let pass = cx
         .pass(&tiles, shader!("analysis/extent"))
         .entry(Entry::Kernel)
-        .read("image", image, Reach::Whole)
+        .read_once("image", image)
         .write("partials", partials)
         .constant("VIEW", view as i32);
     walk.describe(pass).add();

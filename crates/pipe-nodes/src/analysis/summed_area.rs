@@ -128,7 +128,7 @@ impl Build<'_> {
             let next = cx.intermediate(&name, self.image());
             cx.pass(&name, extended(&shader!("analysis/sat_lines"), &self.texels(&[], &[])))
                 .entry(Entry::Kernel)
-                .read("sums", current, Reach::Whole)
+                .read_once("sums", current)
                 .write("out", next)
                 .constant("AXIS", axis as i32)
                 .grid(Grid::Groups([self.size[1 - axis].div_ceil(64), 1, 1]))
@@ -171,7 +171,7 @@ impl Build<'_> {
         let shader = shader!("analysis/sat_tile_sums");
         cx.pass(&self.name("sums"), extended(&shader, &self.texels(&[], &["rows", "columns"])))
             .entry(Entry::Kernel)
-            .read("image", image, Reach::Whole)
+            .read_once("image", image)
             .write("rows", rows)
             .write("columns", columns)
             .constant("SIDE", side)
@@ -200,7 +200,7 @@ impl Build<'_> {
         let shader = shader!("analysis/sat_tiles");
         cx.pass(&self.name("table"), extended(&shader, &self.texels(&["left", "edges"], &[])))
             .entry(Entry::Kernel)
-            .read("image", image, Reach::Whole)
+            .read_once("image", image)
             .read("left", left, Reach::Whole)
             .read("edges", edges, Reach::Whole)
             .write("out", out)

@@ -14,6 +14,9 @@ use super::ports::narrow;
 use crate::PlanError;
 use crate::kernel_pass::{KernelPass, Ops, Source};
 
+/// Entries from which on a thread takes several of a table.
+const LONG_TABLE: u32 = 1 << 18;
+
 /// How the grid is covered.
 pub(super) struct Cover {
     /// Elements along x, y, z; `None` when it is the size of the first output, asked at run time.
@@ -57,7 +60,8 @@ impl Cover {
             "vec3i" if cpu => ([64, 1, 1], 1, 0),
             "vec3i" => ([4, 4, 4], 1, 0),
             _ if cpu => ([64, 1, 1], 1, 0),
-            _ => ([256, 1, 1], 1, 0),
+            // Long tables, such as the words of a file, are bound by threads too.
+            _ => ([256, 1, 1], if elements[0] >= LONG_TABLE { 4 } else { 1 }, 0),
         };
         let mut groups = [0; 3];
         for i in 0..3 {
@@ -134,8 +138,13 @@ pub(super) fn main_module(pass: &KernelPass, cover: &Cover, ops: &Ops, index: &d
     );
     match cover.position {
         "i32" => {
-            let row = cover.groups[0] * sx;
-            let _ = write!(text, "    let at = i32(group.y * {row}u + group.x * {sx}u + local.x);\n    if at < {nx} {{ {body} }}\n");
+            let (each, per_group) = (cover.each, sx * cover.each);
+            let row = cover.groups[0] * per_group;
+            let _ = write!(
+                text,
+                "    let start = i32(group.y * {row}u + group.x * {per_group}u + local.x);\n\
+                 \x20   for (var t = 0; t < {each}; t++) {{\n        let at = start + t * {sx};\n        if at < {nx} {{ {body} }}\n    }}\n"
+            );
         }
         "vec3i" => {
             let _ = write!(
