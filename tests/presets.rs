@@ -137,8 +137,11 @@ fn presets_agree_with_their_twins_and_goldens() {
             ..Request::default()
         };
         let graph = project.resolve(&request, &World::default()).unwrap_or_else(|| panic!("{}", project.render(false)));
+        let pictures: Vec<_> = graph.outputs().filter(|(_, value)| graph.ty(*value).kind() == EdgeKind::Image).collect();
+        if pictures.is_empty() {
+            continue;
+        }
         let twins = evaluate(&graph, &|_| subject.input.as_ref().expect("it asks for its input").1.clone());
-        let pictures = graph.outputs().filter(|(_, value)| graph.ty(*value).kind() == EdgeKind::Image);
         for (output, value) in pictures {
             seen += 1;
             let Some(Tensor::Image(twin)) = twins.get(&value) else { panic!("{preset} makes no image") };
