@@ -4,6 +4,8 @@
 // passes read runs. `Texel` and the writing of tables stand behind this file. Columns of the tile are exchanged
 // with the row's number, so that neither a row nor a column of threads meets in one bank of workgroup memory.
 
+import package::lib::wide::sum_error;
+
 const LANES_Y = SIDE / 8;
 
 var<workgroup> tile: array<Texel, SIDE * SIDE>;
