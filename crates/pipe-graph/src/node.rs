@@ -255,13 +255,15 @@ pub struct Tolerance {
     pub absolute: f64,
     /// Relative part.
     pub relative: f64,
+    /// Share of the values that may be anything else: where chance decides by a comparison, rounding may decide otherwise.
+    pub strays: f64,
 }
 
 impl Tolerance {
     /// Equal to the bit: integer work, copies.
-    pub const EXACT: Self = Self { absolute: 0.0, relative: 0.0 };
+    pub const EXACT: Self = Self { absolute: 0.0, relative: 0.0, strays: 0.0 };
     /// What 32-bit arithmetic gives without care: the default.
-    pub const FLOAT: Self = Self { absolute: 1e-6, relative: 1e-5 };
+    pub const FLOAT: Self = Self { absolute: 1e-6, relative: 1e-5, strays: 0.0 };
 }
 
 /// A node kind as the registry knows it: everything that is not in the struct itself.
@@ -340,7 +342,14 @@ impl Kind {
     /// With this tolerance.
     #[must_use]
     pub const fn tolerance(mut self, absolute: f64, relative: f64) -> Self {
-        self.tolerance = Tolerance { absolute, relative };
+        self.tolerance = Tolerance { absolute, relative, strays: 0.0 };
+        self
+    }
+
+    /// With a share of values that may be outside the tolerance.
+    #[must_use]
+    pub const fn strays(mut self, share: f64) -> Self {
+        self.tolerance.strays = share;
         self
     }
 }
