@@ -3,7 +3,10 @@
 CARGO ?= cargo
 IMAGE := tests/data/workshop.exr
 
-.PHONY: demo test build setup fmt clippy generated goldens
+.PHONY: demo test build setup fmt clippy generated gallery goldens
+
+# Vulkan's layers complain where there is no session.
+export XDG_RUNTIME_DIR ?= /tmp
 
 # The main job on a real photograph: tone mapping. Prints the plan and where the picture is.
 demo: setup
@@ -34,6 +37,10 @@ clippy:
 generated: build
 	./target/release/pipe nodes --markdown > docs/nodes.md
 
+# Runs every preset and writes the page with their pictures anew. VOLUME=scan.nii.gz adds those of scans.
+gallery: build
+	./target/release/pipe presets --gallery docs/gallery --image $(IMAGE) $(if $(VOLUME),--volume $(VOLUME))
+
 # Writes the expected pictures of the presets anew. Look at each before it is committed.
-goldens: build
-	./target/release/pipe test --bless tests/golden
+goldens: setup
+	PIPE_BLESS=1 $(CARGO) test --locked --package pipe-tests --test presets

@@ -34,7 +34,7 @@ pub(crate) enum Verb {
     /// Show the node library, or the reference of one node.
     Nodes(NodesArgs),
     /// Show the graphs that come with the program.
-    Presets(NodesArgs),
+    Presets(PresetsArgs),
     /// Show adapters, their limits and features.
     Devices(DevicesArgs),
     /// Compare two images; exit code 1 when they differ more than allowed.
@@ -196,6 +196,24 @@ pub(crate) struct NodesArgs {
     /// As Markdown: the reference page.
     #[arg(long)]
     pub(crate) markdown: bool,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct PresetsArgs {
+    /// Which one.
+    pub(crate) name: Option<String>,
+    /// Answer as JSON.
+    #[arg(long)]
+    pub(crate) json: bool,
+    /// Run every preset and write a page with their pictures into a folder.
+    #[arg(long, value_name = "FOLDER")]
+    pub(crate) gallery: Option<PathBuf>,
+    /// The picture for presets that take one.
+    #[arg(long, value_name = "FILE", requires = "gallery")]
+    pub(crate) image: Option<String>,
+    /// The volume for presets that take one.
+    #[arg(long, value_name = "FILE", requires = "gallery")]
+    pub(crate) volume: Option<String>,
 }
 
 #[derive(Debug, Args)]

@@ -7,7 +7,7 @@ use pipe::{Failure, presets};
 use pipe_graph::diagnostic::nearest;
 use pipe_nodes::reference;
 
-use super::args::NodesArgs;
+use super::args::{NodesArgs, PresetsArgs};
 use super::{print, print_json};
 
 /// The node library, or one node.
@@ -31,7 +31,10 @@ pub(super) fn nodes(a: &NodesArgs) -> Result<(), Failure> {
 }
 
 /// The presets, or the text of one.
-pub(super) fn presets(a: &NodesArgs) -> Result<(), Failure> {
+pub(super) fn presets(a: &PresetsArgs) -> Result<(), Failure> {
+    if let Some(folder) = &a.gallery {
+        return super::gallery::gallery(folder, a);
+    }
     if let Some(name) = &a.name {
         let Some(text) = presets::text(name) else {
             let hint = nearest(name, presets::names()).map_or("`pipe presets` lists all".to_owned(), |n| format!("did you mean `{n}`?"));

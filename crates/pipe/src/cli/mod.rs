@@ -6,6 +6,7 @@ mod check;
 mod compare;
 mod devices;
 mod doctor;
+mod gallery;
 mod golden;
 mod library;
 mod output;
