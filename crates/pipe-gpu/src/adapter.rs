@@ -163,8 +163,9 @@ pub(crate) fn limits(adapter: &wgpu::Adapter) -> Limits {
     let l = adapter.limits();
     let half = [wgpu::TextureFormat::R16Float, wgpu::TextureFormat::Rg16Float];
     let storable = |f| adapter.get_texture_format_features(f).allowed_usages.contains(wgpu::TextureUsages::STORAGE_BINDING);
+    let cpu = adapter.get_info().device_type == DeviceType::Cpu;
     Limits {
-        profile: if adapter.get_info().device_type == DeviceType::Cpu { Profile::Cpu } else { Profile::Gpu },
+        profile: if cpu { Profile::Cpu } else { Profile::Gpu },
         max_image: l.max_texture_dimension_2d,
         max_volume: l.max_texture_dimension_3d,
         max_binding_bytes: l.max_storage_buffer_binding_size.min(l.max_buffer_size) & !255,
@@ -173,6 +174,15 @@ pub(crate) fn limits(adapter: &wgpu::Adapter) -> Limits {
         max_storage_buffers: l.max_storage_buffers_per_shader_stage,
         max_groups: l.max_compute_workgroups_per_dimension,
         half_storage: adapter.features().contains(Features::TEXTURE_ADAPTER_SPECIFIC_FORMAT_FEATURES) && half.into_iter().all(storable),
-        budget: None,
+        // What a GPU has free, no portable interface tells.
+        budget: if cpu { available_memory() } else { None },
     }
+}
+
+/// Three quarters of the memory that Linux could give away now: decoded files need some too.
+fn available_memory() -> Option<u64> {
+    let text = std::fs::read_to_string("/proc/meminfo").ok()?;
+    let line = text.lines().find_map(|line| line.strip_prefix("MemAvailable:"))?;
+    let kibibytes: u64 = line.trim().strip_suffix("kB")?.trim().parse().ok()?;
+    Some(kibibytes / 4 * 3 * 1024)
 }

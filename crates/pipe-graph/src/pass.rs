@@ -456,7 +456,7 @@ pub struct Limits {
     pub max_groups: u32,
     /// Whether 1- and 2-channel half images can be written by kernels (`r16float`, `rg16float` storage).
     pub half_storage: bool,
-    /// Bytes that may be alive at once, staging included; `None` when nobody said.
+    /// Bytes that may be alive at once, staging included; `None` when nobody knows.
     pub budget: Option<u64>,
 }
 

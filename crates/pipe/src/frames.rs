@@ -8,12 +8,14 @@ use std::collections::HashMap;
 use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 use std::sync::mpsc::sync_channel;
 
+use pipe_graph::resolve::Request;
 use pipe_io::sequence::{FrameRange, Pattern};
 use pipe_io::{Animation, Format, Target};
+use pipe_plan::lower::Rim;
 
 use crate::Failure;
-use crate::project::Project;
-use crate::run::{Finished, Inputs, Job, Report, Session, decode, input_kinds};
+use crate::project::{Project, World};
+use crate::run::{Finished, Inputs, Job, Report, Session, decode, input_kinds, make_plan};
 
 /// Which frames, and what to do about bad ones.
 #[derive(Debug, Clone, Copy)]
@@ -48,6 +50,15 @@ fn at_frame(job: &Job, frame: u32) -> Result<Job, Failure> {
         }
     }
     Ok(job)
+}
+
+/// Whether frames need the ones before them: whether a plan for inputs of some size keeps anything.
+fn remembers(project: &mut Project, session: &Session, job: &Job) -> bool {
+    let request = Request { settings: job.settings.clone(), frame: job.frame, ..Request::default() };
+    let graph = project.resolve(&request, &World { read: job.read });
+    // Histories are those of the outputs that are asked for, and those are what a later frame has.
+    let plan = graph.and_then(|graph| make_plan(&graph, &Rim::default(), &session.limits(), job).ok());
+    plan.is_some_and(|plan| !plan.histories.is_empty())
 }
 
 /// The outputs that hold all frames in one file.
@@ -95,9 +106,7 @@ pub fn run_sequence(
 ) -> Result<Outcome, Failure> {
     let mut project = Project::open(&job.graph)?;
     let kinds = input_kinds(&mut project);
-    let remembers =
-        project.document.as_ref().is_some_and(|d| d.nodes.iter().any(|c| c.kind.value == "Feedback" || c.kind.value == "Accumulate"));
-    if remembers && sequence.resume {
+    if sequence.resume && remembers(&mut project, session, job) {
         return Err(Failure::Graph(
             "a graph with Feedback cannot be resumed: each frame needs the one before\n  next: run it without --resume".into(),
         ));

@@ -294,3 +294,38 @@ fn frames_become_one_moving_picture() {
     fails(folder, &["run", "moving.ron", "still.png", "--frames", "1-5"], 1, "out.apng");
     fails(folder, &["run", "moving.ron", "again.apng", "--frames", "1-5", "--resume"], 1, "--resume");
 }
+
+#[test]
+fn frames_that_need_each_other_are_not_resumed() {
+    let folder = folder();
+    let folder = folder.path();
+    let graph = r#"Graph(version: 1, inputs: {"in": Image}, nodes: {
+        "trail": Feedback(init: "in", next: "mixed"),
+        "mixed": Mix(a: "in", b: "trail"),
+    }, outputs: {"out": "mixed"})"#;
+    fs::write(folder.join("trail.ron"), graph).expect("written");
+    let outer = r#"Graph(version: 1, inputs: {"in": Image}, nodes: {"t": Subgraph(file: "trail.ron", inputs: {"in": "in"})}, outputs: {"out": "t"})"#;
+    fs::write(folder.join("outer.ron"), outer).expect("written");
+    for graph in ["trail.ron", "outer.ron"] {
+        fails(folder, &["run", graph, "in.exr", "out.####.png", "--frames", "1-3", "--resume"], 1, "without --resume");
+        succeeds(folder, &["run", graph, "in.exr", "out.####.png", "--frames", "1-3"]);
+    }
+}
+
+#[test]
+fn a_window_of_a_scan_is_0_to_1() {
+    let folder = folder();
+    let folder = folder.path();
+    let voxels: Vec<u8> = [-1000_i16, 0, 100, 300, 3000, 200].iter().flat_map(|v| v.to_le_bytes()).collect();
+    fs::write(folder.join("scan.raw"), voxels).expect("written");
+    let graph = r##"Graph(version: 1, nodes: {
+        "scan": ReadVolume(path: "scan.raw#6x1x1:i16", window: (0, 400)),
+        "slice": VolumeSlice(volume: "scan"),
+        "r": Readback(source: "slice", path: "slice.json"),
+    })"##;
+    fs::write(folder.join("scan.ron"), graph).expect("written");
+    succeeds(folder, &["run", "scan.ron"]);
+    let values: serde_json::Value = serde_json::from_slice(&fs::read(folder.join("slice.json")).expect("read")).expect("JSON");
+    let flat: Vec<f64> = values.to_string().split(['[', ']', ',']).filter_map(|v| v.trim().parse().ok()).collect();
+    assert_eq!(flat, [0.0, 0.0, 0.25, 0.75, 1.0, 0.5], "{values}");
+}

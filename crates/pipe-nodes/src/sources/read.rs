@@ -1,6 +1,9 @@
 //! `ReadImage`, `ReadVolume` and `ReadTable`: files as sources.
 
 use pipe_graph::prelude::*;
+use pipe_graph::reference::Block;
+
+use crate::shader;
 
 /// An image file, converted to working space like a graph input; `file.exr#layer` names a layer.
 #[derive(Debug, Default, Serialize, Deserialize, JsonSchema)]
@@ -49,6 +52,8 @@ impl Node for ReadImage {
 pub(super) struct ReadVolume {
     /// Path, relative to the graph file. `file.nii#3` is a point in time of a series.
     path: String,
+    /// Values that become 0 and 1, `(low, high)`; what lies outside is clamped. A window of a CT, say, in Hounsfield units.
+    window: Option<(f32, f32)>,
     #[serde(skip)]
     found: Option<(String, VolumeType)>,
 }
@@ -65,6 +70,9 @@ impl Node for ReadVolume {
 
     fn outputs(&self, _: &mut Inputs<'_>) -> Result<Vec<Output>, Mistake> {
         let (_, ty) = self.found.as_ref().ok_or_else(|| Mistake::new("was not opened"))?;
+        if self.window.is_some_and(|(low, high)| low >= high) {
+            return Err(Mistake::in_field("window", "holds nothing").hint("give the smaller value first: `window: (-100, 300)`"));
+        }
         Ok(Output::out(EdgeType::Volume(*ty)))
     }
 
@@ -74,12 +82,30 @@ impl Node for ReadVolume {
 
     fn lower(&self, cx: &mut Lowering<'_>) -> Result<(), Mistake> {
         let file = cx.file();
-        cx.emit("out", file);
+        let Some((low, high)) = self.window else {
+            cx.emit("out", file);
+            return Ok(());
+        };
+        let out = cx.output("out");
+        cx.pass("", shader!("sources/window"))
+            .read("file", file, Reach::Point)
+            .write("out", out)
+            .param("low", low)
+            .param("high", high)
+            .add();
         Ok(())
     }
 
     fn reference(&self, cx: &Reference<'_>) -> Vec<Tensor> {
-        cx.file.cloned().into_iter().collect()
+        let windowed = |file: &Tensor| match (file, self.window) {
+            (Tensor::Volume(block), Some((low, high))) => {
+                let [low, high] = [low, high].map(f64::from);
+                let voxels = block.voxels.iter().map(|v| v.map(|v| ((v - low) / (high - low)).clamp(0.0, 1.0))).collect();
+                Tensor::Volume(Block { voxels, ..block.clone() })
+            }
+            _ => file.clone(),
+        };
+        cx.file.map(windowed).into_iter().collect()
     }
 }
 

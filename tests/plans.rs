@@ -1,0 +1,139 @@
+//! What must hold for every plan, on random graphs: fusing, sharing slots and scheduling change no result, and the order of a
+//! file decides nothing.
+
+use std::cell::RefCell;
+
+use pipe_graph::graph::Graph;
+use pipe_graph::pass::{Limits, Profile};
+use pipe_graph::reference::Tensor;
+use pipe_plan::{Options, Plan};
+use pipe_tests::bench::{Bench, compile, plan, reference};
+use pipe_tests::source::{edge, edge_type};
+use proptest::prelude::*;
+use proptest::test_runner::{Config, TestRunner};
+
+/// Small, odd, and larger than a workgroup along one axis only.
+const SIZE: [u32; 2] = [19, 7];
+
+/// A node of a random graph: which kind, and how far back its inputs lie.
+type Choice = (u8, usize, usize);
+
+/// The text of node `i`, whose inputs are among the images before it.
+fn node(i: usize, (kind, a, b): Choice) -> String {
+    let image = |back: usize| match i.checked_sub(1 + back % (i + 2)) {
+        Some(n) => format!("n{n}"),
+        None => ["in", "other"][back % 2].to_owned(),
+    };
+    let (a, b) = (image(a), image(b));
+    match kind % 14 {
+        0 => format!(r#"Exposure(image: "{a}", ev: -0.5)"#),
+        1 => format!(r#"Invert(image: "{a}")"#),
+        2 => format!(r#"Saturation(image: "{a}", factor: 0.6)"#),
+        3 | 4 => format!(r#"Mix(a: "{a}", b: "{b}", factor: 0.4)"#),
+        5 => format!(r#"Math(a: "{a}", b: "{b}", op: Max)"#),
+        6 => format!(r#"Luminance(image: "{a}")"#),
+        7 => format!(r#"GaussianBlur(image: "{a}", sigma: 0.7, options: (border: Mirror))"#),
+        8 => format!(r#"Laplacian(image: "{a}", options: (border: Black))"#),
+        9 => format!(r#"Flip(image: "{a}")"#),
+        10 => format!(r#"Clamp(image: "{a}", min: -2, max: 2)"#),
+        11 => format!(r#"Normalize(image: "{a}", low: -3, high: 3, options: (repeat: 3))"#),
+        12 => format!(r#"BoxBlur(image: "{a}", radius: 2)"#),
+        _ => format!(
+            r#"Iterate(state: {{"u": "in"}}, body: {{"s": Mix(a: "u", b: "{a}", factor: 0.2), "t": BlurH(image: "s", sigma: 0.6)}},
+                next: {{"u": "t"}}, count: 3)"#
+        ),
+    }
+}
+
+/// A graph of these nodes; the last three are outputs, and the mean of the last is measured.
+fn text(choices: &[Choice], order: &[usize]) -> String {
+    let nodes: Vec<String> = choices.iter().enumerate().map(|(i, c)| format!("\"n{i}\": {},\n", node(i, *c))).collect();
+    let ordered: String = order.iter().filter_map(|i| nodes.get(*i)).cloned().collect();
+    let n = choices.len();
+    let outputs: String = (n.saturating_sub(3)..n).map(|i| format!("\"o{i}\": \"n{i}\", ")).collect();
+    format!(
+        r#"Graph(version: 1, inputs: {{"in": Image, "other": Image}}, nodes: {{{ordered} "mean": PyramidAverage(image: "n{}")}},
+        outputs: {{{outputs} "mean": "mean"}})"#,
+        n - 1
+    )
+}
+
+fn graph(text: &str) -> Graph {
+    let types = ["in", "other"].map(|n| (n, edge_type(n, SIZE)));
+    compile(text, &types).unwrap_or_else(|e| panic!("{text}\n{e}"))
+}
+
+fn planned(graph: &Graph, limits: &Limits, fuse: bool) -> Plan {
+    plan(graph, limits, &Options { fuse, ..Options::default() }).unwrap_or_else(|e| panic!("{e}"))
+}
+
+fn input(name: &str) -> Tensor {
+    edge(name, SIZE)
+}
+
+fn config(cases: u32) -> Config {
+    Config { cases, failure_persistence: None, ..Config::default() }
+}
+
+proptest! {
+    #![proptest_config(config(150))]
+
+    #[test]
+    fn the_order_of_a_file_decides_nothing_and_fusing_only_saves(
+        choices in prop::collection::vec((any::<u8>(), 0_usize..12, 0_usize..12), 2..60),
+        seed in any::<u64>(),
+    ) {
+        let n = choices.len();
+        let forwards: Vec<usize> = (0..n).collect();
+        let mut shuffled = forwards.clone();
+        shuffled.sort_by_key(|i| (*i as u64 + 1).wrapping_mul(seed | 1).rotate_left(17));
+        let (one, other) = (graph(&text(&choices, &forwards)), graph(&text(&choices, &shuffled)));
+        for profile in [Profile::Gpu, Profile::Cpu] {
+            let limits = Limits { profile, ..Limits::default() };
+            let fused = planned(&one, &limits, true);
+            prop_assert_eq!(fused.to_text(), planned(&other, &limits, true).to_text());
+            let plain = planned(&one, &limits, false);
+            prop_assert!(fused.pass_count() <= plain.pass_count());
+            prop_assert!(fused.peak_bytes <= fused.naive_bytes && plain.peak_bytes <= plain.naive_bytes);
+        }
+    }
+}
+
+/// A slot that held two live resources, a fused pass that read what is not there yet, a loop that ended in the wrong buffer:
+/// each would show.
+#[test]
+fn every_plan_gives_what_the_graph_means() {
+    let bench = RefCell::new(Bench::new());
+    let graphs = prop::collection::vec((any::<u8>(), 0_usize..8, 0_usize..8), 2..24);
+    let outcome = TestRunner::new(config(24)).run(&graphs, |choices| {
+        let order: Vec<usize> = (0..choices.len()).collect();
+        let text = text(&choices, &order);
+        let graph = graph(&text);
+        let expected = reference(&graph, &input);
+        let mut bench = bench.borrow_mut();
+        let limits = bench.limits();
+        for fuse in [true, false] {
+            let got = bench.run(&graph, planned(&graph, &limits, fuse), &input).map_err(TestCaseError::fail)?;
+            for (name, expected) in &expected {
+                for (i, (g, e)) in got[name].iter().zip(expected).enumerate() {
+                    let close = (g - e).abs() <= 2e-4 * (1.0 + e.abs());
+                    prop_assert!(close, "fuse: {fuse}: {name}[{i}] is {g}, expected {e}\n{text}");
+                }
+            }
+        }
+        Ok(())
+    });
+    outcome.unwrap_or_else(|e| panic!("{e}"));
+}
+
+/// 500 nodes are planned in the time of a blink; the bound is generous, the figure stands in docs/performance.md.
+#[test]
+fn a_graph_of_500_nodes_is_planned() {
+    let choices: Vec<Choice> = (0..500).map(|i| ((i * 7 % 11) as u8, i * 5 % 9, i * 3 % 7)).collect();
+    let order: Vec<usize> = (0..choices.len()).collect();
+    let graph = graph(&text(&choices, &order));
+    let started = std::time::Instant::now();
+    let plan = planned(&graph, &Limits::default(), true);
+    println!("{} passes in {:.1} ms", plan.pass_count(), started.elapsed().as_secs_f64() * 1e3);
+    assert!(plan.peak_bytes < plan.naive_bytes);
+}
