@@ -267,6 +267,9 @@ pub(crate) struct BenchArgs {
     /// Sizes of the inputs, 4096x4096 unless given.
     #[arg(long, value_name = "WxH")]
     pub(crate) size: Vec<String>,
+    /// Pictures are 32-bit floats on their way in and out, not halfs and 8-bit sRGB: what nodes cost without conversion.
+    #[arg(long)]
+    pub(crate) float: bool,
     /// Runs that are measured; the median counts.
     #[arg(long, default_value_t = 7)]
     pub(crate) runs: u32,

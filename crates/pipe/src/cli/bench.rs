@@ -44,7 +44,7 @@ fn one(session: &mut Session, a: &BenchArgs, size: [u32; 2]) -> Result<Value, Fa
     let mut inputs = Inputs::new();
     for input in &document.inputs {
         let made = match kinds.get(&input.name.value) {
-            Some(EdgeKind::Image) => Decoded::Picture(test_picture(size)),
+            Some(EdgeKind::Image) => Decoded::Picture(test_picture(size, a.float)),
             Some(EdgeKind::Volume) => Decoded::Volume(test_volume(size)),
             _ => return Err(Failure::Graph(format!("bench makes images and volumes only; input `{}` is neither", input.name.value))),
         };
@@ -56,6 +56,7 @@ fn one(session: &mut Session, a: &BenchArgs, size: [u32; 2]) -> Result<Value, Fa
         let file = match graph.ty(value).kind() {
             EdgeKind::Volume => "bench.nrrd",
             EdgeKind::Mesh => "bench.ply",
+            EdgeKind::Image if a.float => "bench.exr",
             EdgeKind::Image | EdgeKind::Table | EdgeKind::Scalar => "bench.png",
         };
         job.bind_output(name, file)?;
@@ -116,7 +117,6 @@ fn collect(steps: &[Step], times: u64, passes: &mut IndexMap<String, (Vec<String
     }
 }
 
-/// A half-float RGB picture of waves and noise: neither constant nor pure noise.
 /// A soft lumpy ball of 8-bit voxels in a cube of at most 512 a side.
 fn test_volume(size: [u32; 2]) -> Volume {
     let n = size[0].min(size[1]).min(512);
@@ -132,7 +132,8 @@ fn test_volume(size: [u32; 2]) -> Volume {
     Volume::of_floats([n; 3], 1, [1.0; 3], &floats, Voxel::U8)
 }
 
-fn test_picture(size: [u32; 2]) -> Picture {
+/// An RGB picture of waves and noise, neither constant nor pure noise, in halfs or in floats.
+fn test_picture(size: [u32; 2], float: bool) -> Picture {
     let [w, h] = size.map(|n| n as usize);
     let mut bytes = Vec::with_capacity(w * h * 6);
     let mut state = 1_u32;
@@ -142,14 +143,18 @@ fn test_picture(size: [u32; 2]) -> Picture {
                 state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
                 let wave = ((x * (c + 2)) as f32 * 0.01).sin() * (y as f32 * 0.013).cos();
                 let v = (0.6 + 0.5 * wave + (state >> 20) as f32 * 5e-5).max(0.0);
-                bytes.extend(half::f16::from_f32(v).to_le_bytes());
+                if float {
+                    bytes.extend(v.to_le_bytes());
+                } else {
+                    bytes.extend(half::f16::from_f32(v).to_le_bytes());
+                }
             }
         }
     }
     Picture {
         width: size[0],
         height: size[1],
-        sample: Sample::F16,
+        sample: if float { Sample::F32 } else { Sample::F16 },
         layout: Layout::Planar,
         channels: Channels::Rgb,
         alpha: Alpha::None,
