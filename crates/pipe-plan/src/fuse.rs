@@ -62,13 +62,13 @@ fn region(list: Vec<Op>, ops: &Ops, outside: &BTreeSet<ResourceId>, limits: &Lim
             pass @ Op::Pass(_) => pass,
         })
         .collect();
-    let mut fusion = Fusion { list: share_equal(list, outside, log), ops, outside, limits, log };
-    while fusion.fold_one() {}
-    while fusion.fold_into_all() {}
-    while fusion.fold_one() {}
-    while fusion.join_one() {}
+    let mut fusion = Fusion { list: share_equal(list, outside, log), ops, outside, limits, log, said: BTreeSet::new() };
+    fusion.everywhere(Fusion::fold);
+    fusion.everywhere(Fusion::fold_into_all);
+    fusion.everywhere(Fusion::fold);
+    fusion.everywhere(Fusion::join);
     // What was joined may have become foldable.
-    while fusion.fold_one() {}
+    fusion.everywhere(Fusion::fold);
     fusion.list
 }
 
@@ -140,6 +140,8 @@ struct Fusion<'a> {
     outside: &'a BTreeSet<ResourceId>,
     limits: &'a Limits,
     log: &'a mut Vec<String>,
+    /// What the log says.
+    said: BTreeSet<String>,
 }
 
 impl Fusion<'_> {
@@ -150,78 +152,92 @@ impl Fusion<'_> {
         }
     }
 
-    /// Operations that need a resource.
-    fn readers(&self, id: ResourceId) -> Vec<usize> {
-        (0..self.list.len()).filter(|i| self.list[*i].sources().contains(&id)).collect()
-    }
-
-    /// Puts one producer into its only consumer; `false` when there is none left.
-    fn fold_one(&mut self) -> bool {
-        for p in 0..self.list.len() {
-            let Some(producer) = self.pass(p) else { continue };
-            let Some(result) = foldable(producer, self.ops) else { continue };
-            if self.outside.contains(&result) {
-                continue;
-            }
-            let readers = self.readers(result);
-            let [c] = readers[..] else { continue };
-            let Some(consumer) = self.pass(c) else { continue };
-            match self.may_fold(producer, consumer, result) {
-                Ok(()) => {
-                    let fused = fold(producer, consumer, result);
-                    if within_limits(&fused, self.ops, self.limits) {
-                        self.note(format!("{} is computed inside {}", producer.name.clone(), consumer.name.clone()));
-                        self.list[c] = Op::Pass(fused);
-                        self.list.remove(p);
-                        return true;
-                    }
-                    let note = format!("{} stays before {}: together they bind more than the device allows", producer.name, consumer.name);
-                    self.note(note);
-                }
-                Err(why) => {
-                    let note = format!("{} stays before {}: {why}", producer.name, consumer.name);
-                    self.note(note);
+    /// Applies a step at every operation until it changes nothing. A step that succeeds takes the operation away, so the
+    /// next one has its place.
+    fn everywhere(&mut self, step: fn(&mut Self, usize) -> bool) {
+        let mut changed = true;
+        while changed {
+            changed = false;
+            let mut at = 0;
+            while at < self.list.len() {
+                if step(self, at) {
+                    changed = true;
+                } else {
+                    at += 1;
                 }
             }
         }
-        false
     }
 
-    /// Puts one producer into each of its few consumers, where computing it anew moves no more bytes than storing it and
-    /// loading it again; `false` when there is none left.
-    fn fold_into_all(&mut self) -> bool {
-        for p in 0..self.list.len() {
-            let Some(producer) = self.pass(p) else { continue };
-            let Some(result) = foldable(producer, self.ops) else { continue };
-            let readers = self.readers(result);
-            let copies = readers.len() as u64;
-            if self.outside.contains(&result) || !(2..=MOST_COPIES).contains(&copies) || producer.stages.len() > MOST_REPEATED {
-                continue;
-            }
-            let read: u64 = producer.reads.iter().map(|r| self.ops.shape(*r).bytes()).sum();
-            let stored = self.ops.shape(result).bytes();
-            if copies * read > read + stored + copies * stored {
-                continue;
-            }
-            let fused = |c: &usize| {
-                let consumer = self.pass(*c)?;
-                let may = taps(consumer, result) == Ok(1) && self.may_fold(producer, consumer, result).is_ok();
-                may.then(|| fold(producer, consumer, result)).filter(|fused| within_limits(fused, self.ops, self.limits))
-            };
-            let Some(fused) = readers.iter().map(fused).collect::<Option<Vec<_>>>() else { continue };
-            let names: Vec<_> = readers.iter().filter_map(|c| self.pass(*c)).map(|c| c.name.clone()).collect();
-            self.note(format!("{} is computed inside {}: that moves fewer bytes than storing it", producer.name, names.join(" and ")));
-            for (c, pass) in readers.into_iter().zip(fused) {
-                self.list[c] = Op::Pass(pass);
-            }
-            self.list.remove(p);
-            return true;
+    /// Operations behind one that need a resource.
+    fn readers(&self, behind: usize, id: ResourceId) -> Vec<usize> {
+        let reads = |op: &Op| match op {
+            Op::Pass(pass) => pass.sources().any(|source| source == id),
+            Op::Loop(_) => op.sources().contains(&id),
+        };
+        (behind + 1..self.list.len()).filter(|i| reads(&self.list[*i])).collect()
+    }
+
+    /// Puts producer `p` into its only consumer, if that may be.
+    fn fold(&mut self, p: usize) -> bool {
+        let Some(producer) = self.pass(p) else { return false };
+        let Some(result) = foldable(producer, self.ops) else { return false };
+        if self.outside.contains(&result) {
+            return false;
         }
-        false
+        let [c] = self.readers(p, result)[..] else { return false };
+        let Some(consumer) = self.pass(c) else { return false };
+        let fused = match self.may_fold(producer, consumer, result) {
+            Ok(()) => fold(producer, consumer, result),
+            Err(why) => {
+                let note = format!("{} stays before {}: {why}", producer.name, consumer.name);
+                self.note(note);
+                return false;
+            }
+        };
+        if !within_limits(&fused, self.ops, self.limits) {
+            let note = format!("{} stays before {}: together they bind more than the device allows", producer.name, consumer.name);
+            self.note(note);
+            return false;
+        }
+        self.note(format!("{} is computed inside {}", producer.name, consumer.name));
+        self.list[c] = Op::Pass(fused);
+        self.list.remove(p);
+        true
+    }
+
+    /// Puts producer `p` into each of its few consumers, where computing it anew moves no more bytes than storing it and
+    /// loading it again.
+    fn fold_into_all(&mut self, p: usize) -> bool {
+        let Some(producer) = self.pass(p) else { return false };
+        let Some(result) = foldable(producer, self.ops) else { return false };
+        if self.outside.contains(&result) || producer.stages.len() > MOST_REPEATED {
+            return false;
+        }
+        let readers = self.readers(p, result);
+        let copies = readers.len() as u64;
+        let read: u64 = producer.reads.iter().map(|r| self.ops.shape(*r).bytes()).sum();
+        let stored = self.ops.shape(result).bytes();
+        if !(2..=MOST_COPIES).contains(&copies) || copies * read > read + stored + copies * stored {
+            return false;
+        }
+        let fused = |c: &usize| {
+            let consumer = self.pass(*c)?;
+            let may = taps(consumer, result) == Ok(1) && self.may_fold(producer, consumer, result).is_ok();
+            may.then(|| fold(producer, consumer, result)).filter(|fused| within_limits(fused, self.ops, self.limits))
+        };
+        let Some(fused) = readers.iter().map(fused).collect::<Option<Vec<_>>>() else { return false };
+        let names: Vec<_> = readers.iter().filter_map(|c| self.pass(*c)).map(|c| c.name.clone()).collect();
+        self.note(format!("{} is computed inside {}: that moves fewer bytes than storing it", producer.name, names.join(" and ")));
+        for (c, pass) in readers.into_iter().zip(fused) {
+            self.list[c] = Op::Pass(pass);
+        }
+        self.list.remove(p);
+        true
     }
 
     fn note(&mut self, text: String) {
-        if !self.log.contains(&text) {
+        if self.said.insert(text.clone()) {
             self.log.push(text);
         }
     }
@@ -247,43 +263,32 @@ impl Fusion<'_> {
         Ok(())
     }
 
-    /// Puts two Point passes over the same grid side by side, when they share an input or one feeds the other.
-    fn join_one(&mut self) -> bool {
-        for a in 0..self.list.len() {
-            for b in a + 1..self.list.len() {
-                let (Some(first), Some(second)) = (self.pass(a), self.pass(b)) else { continue };
-                if !is_points(first) || !is_points(second) || first.last().shape_size() != second.last().shape_size() {
-                    continue;
-                }
-                let feeds = second.reads.iter().any(|r| first.writes.iter().any(|w| w.resource == *r));
-                let image = |r: &ResourceId| matches!(self.ops.shape(*r), Shape::Image(_));
-                let shares = first.reads.iter().any(|r| image(r) && second.reads.contains(r));
-                if !(feeds || shares) || first.stages.len() + second.stages.len() > MOST_STAGES {
-                    continue;
-                }
-                let half = |p: &KernelPass| {
-                    p.writes.iter().any(|w| matches!(self.ops.shape(w.resource), Shape::Image(t) if t.precision == Precision::F16))
-                };
-                if feeds && half(first) {
-                    continue;
-                }
-                // Something between the two that needs the first and feeds the second keeps them apart.
-                if self.way_between(a, b) {
-                    continue;
-                }
-                let joined = join(first, second);
-                if within_limits(&joined, self.ops, self.limits) {
-                    let note = format!("{} and {} run in one kernel", first.name, second.name);
-                    self.note(note);
-                    // It stands where the second stood: everything that the second needs is there, and nothing between
-                    // needs the first.
-                    if self.needed_between(a, b) {
-                        continue;
-                    }
-                    self.list[b] = Op::Pass(joined);
-                    self.list.remove(a);
-                    return true;
-                }
+    /// Puts Point pass `a` beside a later one over the same grid, when they share an input or one feeds the other.
+    fn join(&mut self, a: usize) -> bool {
+        let Some(first) = self.pass(a).filter(|pass| is_points(pass)) else { return false };
+        let half = first.writes.iter().any(|w| matches!(self.ops.shape(w.resource), Shape::Image(t) if t.precision == Precision::F16));
+        let image = |r: &ResourceId| matches!(self.ops.shape(*r), Shape::Image(_));
+        for b in a + 1..self.list.len() {
+            let Some(second) = self.pass(b) else { continue };
+            if !is_points(second) || first.last().shape_size() != second.last().shape_size() {
+                continue;
+            }
+            let feeds = second.reads.iter().any(|r| first.writes.iter().any(|w| w.resource == *r));
+            let shares = first.reads.iter().any(|r| image(r) && second.reads.contains(r));
+            if !(feeds || shares) || (feeds && half) || first.stages.len() + second.stages.len() > MOST_STAGES {
+                continue;
+            }
+            // It will stand where the second stood: everything that the second needs is there. What lies between may neither
+            // need the first, nor lead from it to the second.
+            if self.needed_between(a, b) || self.way_between(a, b) {
+                continue;
+            }
+            let joined = join(first, second);
+            if within_limits(&joined, self.ops, self.limits) {
+                self.note(format!("{} and {} run in one kernel", first.name, second.name));
+                self.list[b] = Op::Pass(joined);
+                self.list.remove(a);
+                return true;
             }
         }
         false
