@@ -74,8 +74,10 @@ impl PyramidAverage {
         let atlas = Atlas::of(ty.size);
         let geometric = self.mean == Mean::Geometric;
         let name = |level: usize| format!("level{level}");
-        let pyramid = Shape::Image(ImageType { precision: Precision::F32, ..ty.with_size(atlas.size) });
-        let mut picture = if atlas.levels.len() == 1 { cx.output("pyramid") } else { cx.intermediate("level0", pyramid) };
+        let out = cx.output("pyramid");
+        // The levels are written into the same storage one after the other, so all have the precision that is asked for.
+        let pyramid = cx.shape(out);
+        let mut picture = if atlas.levels.len() == 1 { out } else { cx.intermediate("level0", pyramid) };
         cx.pass("level0", shader!("analysis/pyramid_base"))
             .entry(Entry::At)
             .read("image", image, Reach::Whole)
@@ -89,7 +91,7 @@ impl PyramidAverage {
             let mut coarser = |what: &str| cx.intermediate(&format!("{}.{what}", name(k)), Shape::image(level.size, ty.channels));
             let (values, weights) = (coarser("values"), coarser("counts"));
             let last = k + 1 == atlas.levels.len();
-            let next = if last { cx.output("pyramid") } else { cx.intermediate(&name(k), pyramid) };
+            let next = if last { out } else { cx.intermediate(&name(k), pyramid) };
             cx.pass(&name(k), shader!("analysis/pyramid_level"))
                 .entry(Entry::Each)
                 .read("finer", finer, Reach::Whole)
