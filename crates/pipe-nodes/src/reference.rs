@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use pipe_graph::node::{Category, Kind, Registry};
+use pipe_graph::node::{Category, Kind, Registry, Tolerance};
 use serde_json::{Value, json};
 
 const SECTIONS: [(Category, &str); 8] = [
@@ -173,6 +173,9 @@ pub fn entry(kind: &Kind) -> String {
             let _ = writeln!(out, "  {name:<16} {text}");
         }
     }
+    if !kind.ports.is_empty() {
+        let _ = writeln!(out, "\naccuracy\n  {}", accuracy(kind.tolerance));
+    }
     if !kind.examples.is_empty() {
         out.push_str("\nexamples\n");
         for example in kind.examples.iter().take(4) {
@@ -210,6 +213,9 @@ pub fn page(registry: &Registry) -> String {
                     cell(property["description"].as_str().unwrap_or_default().to_owned())
                 );
             }
+            if !kind.ports.is_empty() {
+                let _ = writeln!(out, "\nAccuracy: {}.", accuracy(kind.tolerance));
+            }
             if kind.ports.len() > 1 {
                 let ports: Vec<_> = kind.ports.iter().map(|(name, text)| format!("`{name}` ({text})")).collect();
                 let _ = writeln!(out, "\nPorts: {}.", ports.join(", "));
@@ -220,6 +226,16 @@ pub fn page(registry: &Registry) -> String {
         }
     }
     out
+}
+
+/// How far results on any device may be from double precision.
+fn accuracy(tolerance: Tolerance) -> String {
+    let Tolerance { absolute, relative, strays } = tolerance;
+    if absolute == 0.0 && relative == 0.0 {
+        return "equal to double precision, rounded once".to_owned();
+    }
+    let but = if strays > 0.0 { format!("; chance may decide {} % of the values otherwise", strays * 100.0) } else { String::new() };
+    format!("within {absolute:e} + {relative:e}·|value| of double precision{but}")
 }
 
 /// The whole library as JSON: name, category, ports, examples and schema of every kind.
