@@ -14,8 +14,8 @@ use indexmap::IndexMap;
 use crate::field::{Accepts, Driven, EdgeIndex, Image, In, Mesh};
 use crate::node::{Mistake, as_image};
 use crate::pass::{
-    Access, Border, Constant, Count, Entry, Filter, Grid, Item, Limits, Loop, NodeLabel, Origin, Pass, PassGraph, Reach, Read, Resource,
-    ResourceId, Shader, Shape, State, Value, Write,
+    Access, Border, Constant, Count, Entry, Filter, Grid, Item, Kept, Limits, Loop, NodeLabel, Origin, Pass, PassGraph, Reach, Read,
+    Resource, ResourceId, Shader, Shape, State, Value, Write,
 };
 use crate::types::{EdgeType, ImageType};
 
@@ -140,7 +140,7 @@ impl<'a> Lowering<'a> {
 
     /// Keeps a resource for the next frame.
     pub fn keep(&mut self, suffix: &str, id: ResourceId) {
-        self.graph.kept.push((format!("{}.{suffix}", self.name), id));
+        self.graph.kept.push(Kept { name: format!("{}.{suffix}", self.name), resource: id, delay: 1 });
     }
 
     /// The border policy of this node.

@@ -396,6 +396,17 @@ pub struct Fetch {
     pub parts: Vec<(ResourceId, Range<u64>)>,
 }
 
+/// A value that is kept from frame to frame.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Kept {
+    /// Name of its history.
+    pub name: String,
+    /// The resource whose value is kept.
+    pub resource: ResourceId,
+    /// For how many frames, at least 1; known also while there are too few frames for anyone to read it.
+    pub delay: u32,
+}
+
 /// What the GPU must do.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct PassGraph {
@@ -407,8 +418,8 @@ pub struct PassGraph {
     pub items: Vec<Item>,
     /// What comes back.
     pub fetches: Vec<Fetch>,
-    /// For each history, the resource whose value this frame is kept for later frames.
-    pub kept: Vec<(String, ResourceId)>,
+    /// What this frame keeps for later ones.
+    pub kept: Vec<Kept>,
 }
 
 impl PassGraph {

@@ -108,9 +108,9 @@ pub(crate) fn allocate(name: &str, schedule: Schedule, limits: &Limits, options:
             slots[at(*id).0 as usize].fetched = true;
         }
     }
-    let histories = ops.kept.iter().map(|(name, keep)| {
-        let (delay, recall) = history(&ops, &given, name);
-        History { name: name.clone(), delay, keep: at(*keep), recall: recall.map(at) }
+    let histories = ops.kept.iter().map(|kept| {
+        let recall = recalled(&ops, &given, &kept.name);
+        History { name: kept.name.clone(), delay: kept.delay, keep: at(kept.resource), recall: recall.map(at) }
     });
     let histories = histories.collect();
 
@@ -155,15 +155,10 @@ fn readers(ops: &Ops) -> BTreeMap<ResourceId, usize> {
     count
 }
 
-/// Delay of a history, and the resource that recalls it, when some pass reads it.
-fn history(ops: &Ops, given: &[ResourceId], wanted: &str) -> (u32, Option<ResourceId>) {
-    let of = |id: &ResourceId| match &ops.resources[id.index()].origin {
-        Origin::History { name, delay } if name == wanted => Some((*delay, *id)),
-        _ => None,
-    };
-    let all = (0..ops.resources.len()).map(|i| ResourceId(i as u32));
-    let delay = all.filter_map(|id| of(&id)).map(|(delay, _)| delay).next().unwrap_or(1);
-    (delay, given.iter().find_map(of).map(|(_, id)| id))
+/// The resource that recalls a history, when some pass reads it.
+fn recalled(ops: &Ops, given: &[ResourceId], wanted: &str) -> Option<ResourceId> {
+    let of_history = |id: &&ResourceId| matches!(&ops.resources[id.index()].origin, Origin::History { name, .. } if name == wanted);
+    given.iter().find(of_history).copied()
 }
 
 /// Refuses what cannot run before anything is allocated.

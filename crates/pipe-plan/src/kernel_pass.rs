@@ -194,7 +194,7 @@ pub(crate) struct Ops {
     pub(crate) nodes: Vec<String>,
     pub(crate) ops: Vec<Op>,
     pub(crate) fetches: Vec<pipe_graph::pass::Fetch>,
-    pub(crate) kept: Vec<(String, ResourceId)>,
+    pub(crate) kept: Vec<pipe_graph::pass::Kept>,
 }
 
 impl Ops {
@@ -224,6 +224,6 @@ impl Ops {
     /// Resources that must be there when everything has run.
     pub(crate) fn wanted(&self) -> impl Iterator<Item = ResourceId> + '_ {
         let fetched = self.fetches.iter().flat_map(|f| f.parts.iter().map(|(r, _)| *r));
-        fetched.chain(self.kept.iter().map(|(_, r)| *r))
+        fetched.chain(self.kept.iter().map(|kept| kept.resource))
     }
 }

@@ -9,7 +9,7 @@ use indexmap::IndexMap;
 use pipe_graph::graph::{Graph, Instance, Iteration, Times, ValueRef, Work};
 use pipe_graph::lowering::{Carried, Lowering, Site};
 use pipe_graph::node::{FileSource, Mistake, Output};
-use pipe_graph::pass::{Border, Count, Filter, Item, Limits, Loop, NodeLabel, Origin, PassGraph, Resource, ResourceId, Shape, State};
+use pipe_graph::pass::{Border, Count, Filter, Item, Kept, Limits, Loop, NodeLabel, Origin, PassGraph, Resource, ResourceId, Shape, State};
 use pipe_graph::rim::{self, PixelForm, VoxelForm};
 use pipe_graph::types::{EdgeType, ImageType};
 
@@ -58,10 +58,10 @@ pub fn lower(graph: &Graph, rim: &Rim, limits: &Limits) -> Result<PassGraph, Pla
         items.extend(lowerer.fetch(&name, values[&value], graph.ty(value)));
     }
     for (_, instance) in graph.iter() {
-        if let Work::Feedback { next, .. } = instance.work
+        if let Work::Feedback { next, delay, .. } = instance.work
             && let Carried::One(id) = values[&next]
         {
-            lowerer.passes.kept.push((instance.name.clone(), id));
+            lowerer.passes.kept.push(Kept { name: instance.name.clone(), resource: id, delay });
         }
     }
     lowerer.passes.items = std::mem::take(&mut lowerer.decoding);

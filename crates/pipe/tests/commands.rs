@@ -329,3 +329,35 @@ fn a_window_of_a_scan_is_0_to_1() {
     let flat: Vec<f64> = values.to_string().split(['[', ']', ',']).filter_map(|v| v.trim().parse().ok()).collect();
     assert_eq!(flat, [0.0, 0.0, 0.25, 0.75, 1.0, 0.5], "{values}");
 }
+
+/// The sequence 1, 2, 3, 4 and what remembering nodes make of it.
+#[test]
+fn frames_remember_as_many_frames_as_they_say() {
+    let folder = folder();
+    let folder = folder.path();
+    let graph = r#"Graph(version: 1, nodes: {
+        "now":  Constant(color: "=frame", size: 4),
+        "one":  Constant(color: 1, size: 4),
+        "none": Constant(color: 0, size: 4),
+        "mean": Accumulate(image: "now"),
+        "ema":  Accumulate(image: "now", op: Ema(alpha: 0.5)),
+        "prev": Feedback(init: "none", next: "sum"),
+        "sum":  Math(a: "prev", b: "one", op: Add),
+        "late": Feedback(init: "none", next: "now", delay: 2),
+    }, outputs: {"mean": "mean", "ema": "ema", "sum": "sum", "late": "late"})"#;
+    fs::write(folder.join("frames.ron"), graph).expect("written");
+    let outputs = ["mean", "ema", "sum", "late"];
+    let named = outputs.map(|o| format!("{o}={o}.####.pfm"));
+    let arguments: Vec<&str> = named.iter().flat_map(|n| ["-o", n]).collect();
+    succeeds(folder, &[&["run", "frames.ron", "--frames", "1-4"], arguments.as_slice()].concat());
+    let first = |output: &str, frame: u32| {
+        let bytes = fs::read(folder.join(format!("{output}.{frame:04}.pfm"))).expect("written");
+        let end: [u8; 4] = bytes[bytes.len() - 4..].try_into().expect("four");
+        // The scale of a PFM is negative when its numbers are little endian.
+        if bytes.windows(2).any(|w| w == b"-1") { f32::from_le_bytes(end) } else { f32::from_be_bytes(end) }
+    };
+    let expected: [[f32; 4]; 4] = [[1.0, 1.5, 2.0, 2.5], [1.0, 1.5, 2.25, 3.125], [1.0, 2.0, 3.0, 4.0], [0.0, 0.0, 1.0, 2.0]];
+    for (output, expected) in outputs.iter().zip(expected) {
+        assert_eq!([1, 2, 3, 4].map(|frame| first(output, frame)), expected, "{output}");
+    }
+}
