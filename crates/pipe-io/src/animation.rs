@@ -1,12 +1,9 @@
 //! Moving pictures: the frames of a sequence in one file, APNG or GIF.
 
-use std::io::{self, Write};
-use std::sync::{Arc, Mutex, PoisonError};
-
 use image::codecs::gif::{GifEncoder, Repeat};
 use image::{Delay, Frame, RgbaImage};
 
-use crate::atomic::AtomicFile;
+use crate::atomic::{AtomicFile, Shared};
 use crate::colour::Colorspace;
 use crate::error::{Error, Fault, Result};
 use crate::form::{WriteOptions, compression_of};
@@ -37,19 +34,6 @@ enum Encoder {
     Gif(Box<GifEncoder<Shared>>),
 }
 
-/// The file, which encoders want for themselves and do not give back.
-#[derive(Clone)]
-struct Shared(Arc<Mutex<AtomicFile>>);
-
-impl Write for Shared {
-    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        self.0.lock().unwrap_or_else(PoisonError::into_inner).write(bytes)
-    }
-    fn flush(&mut self) -> io::Result<()> {
-        self.0.lock().unwrap_or_else(PoisonError::into_inner).flush()
-    }
-}
-
 impl Animation {
     /// Begins a file of so many frames, shown at `rate` frames a second.
     ///
@@ -59,8 +43,7 @@ impl Animation {
             return Err(Error::Form { file: target.to_string(), reason: format!("{} holds one picture", target.format.name()) });
         }
         let file = AtomicFile::create(target.path.as_deref()).map_err(|error| Error::write(target, error))?;
-        let file = Shared(Arc::new(Mutex::new(file)));
-        Ok(Self { target: target.clone(), options: options.clone(), frames, rate, file, encoder: None, written: 0 })
+        Ok(Self { target: target.clone(), options: options.clone(), frames, rate, file: Shared::new(file), encoder: None, written: 0 })
     }
 
     /// Appends a frame in the form that [`output_form`](crate::output_form) asked for. All frames have one size.
@@ -112,9 +95,7 @@ impl Animation {
         if let Some(Encoder::Apng(writer)) = self.encoder.take() {
             writer.finish().map_err(|error| png::failure(error).of(&self.target, self.target.format))?;
         }
-        let file = Arc::into_inner(self.file.0).expect("the encoder is gone, so this is the only handle");
-        let file = file.into_inner().unwrap_or_else(PoisonError::into_inner);
-        file.commit().map_err(|error| Error::write(&self.target, error))
+        self.file.into_file().commit().map_err(|error| Error::write(&self.target, error))
     }
 }
 

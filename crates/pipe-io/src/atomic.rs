@@ -6,8 +6,9 @@
 //! replaced and is written directly; a symbolic link is followed, so that the link stays and its target changes.
 
 use std::fs::{self, File, OpenOptions, Permissions};
-use std::io::{self, Stdout, Write};
+use std::io::{self, Seek, SeekFrom, Stdout, Write};
 use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex, PoisonError};
 
 use tempfile::NamedTempFile;
 
@@ -105,6 +106,16 @@ impl AtomicFile {
         }
     }
 
+    /// Whether what was written can be gone back to.
+    pub(crate) fn seeks(&self) -> bool {
+        match self.kind {
+            Kind::Temporary { .. } => true,
+            #[cfg(target_os = "linux")]
+            Kind::Unnamed { .. } => true,
+            Kind::Direct(_) | Kind::Stdout(_) => false,
+        }
+    }
+
     /// Writes a whole file at once.
     pub fn write_whole(path: Option<&Path>, bytes: &[u8]) -> io::Result<()> {
         let mut file = Self::create(path)?;
@@ -132,6 +143,42 @@ impl Write for AtomicFile {
             Kind::Direct(file) => file.flush(),
             Kind::Stdout(stream) => stream.flush(),
         }
+    }
+}
+
+impl Seek for AtomicFile {
+    fn seek(&mut self, to: SeekFrom) -> io::Result<u64> {
+        match &mut self.kind {
+            Kind::Temporary { file, .. } => file.seek(to),
+            #[cfg(target_os = "linux")]
+            Kind::Unnamed { file, .. } => file.seek(to),
+            Kind::Direct(_) | Kind::Stdout(_) => Err(io::ErrorKind::NotSeekable.into()),
+        }
+    }
+}
+
+/// A file for an encoder that wants it for itself and does not give it back.
+#[derive(Clone)]
+pub(crate) struct Shared(Arc<Mutex<AtomicFile>>);
+
+impl Shared {
+    pub(crate) fn new(file: AtomicFile) -> Self {
+        Self(Arc::new(Mutex::new(file)))
+    }
+
+    /// The file, once the encoder is gone.
+    pub(crate) fn into_file(self) -> AtomicFile {
+        let file = Arc::into_inner(self.0).expect("the encoder is gone, so this is the only handle");
+        file.into_inner().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+impl Write for Shared {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner).write(bytes)
+    }
+    fn flush(&mut self) -> io::Result<()> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner).flush()
     }
 }
 

@@ -74,12 +74,14 @@ pub enum Error {
         reason: String,
     },
     /// The header declares more than the limits allow.
-    #[error("`{file}` is too large: {reason}; raise the limit if this is meant")]
+    #[error("`{file}` is too large: {reason}; {advice}")]
     TooLarge {
         /// The file as the user named it.
         file: String,
         /// What is declared and what is allowed.
         reason: String,
+        /// What to do about it.
+        advice: &'static str,
     },
     /// No layer or part has the name after the `#`.
     #[error("`{file}` has no layer `{wanted}`; it has: {available}")]
@@ -140,14 +142,25 @@ impl Error {
     }
 }
 
+/// What to do about a file that is too large.
+pub(crate) const RAISE: &str = "raise the limit if this is meant";
+const BY_ROWS: &str = "read it by bands of rows, or raise the limit if this is meant";
+const NOT_BY_ROWS: &str = "convert it to EXR, PNG or TIFF, which are read by bands of rows, or raise the limit if this is meant";
+
 /// What a codec has to say; it becomes an [`Error`] where the file's name is known.
 #[derive(Debug)]
 pub(crate) enum Fault {
     Damaged(String),
     Unsupported(String),
     TooLarge(String),
-    NoSuchLayer { wanted: String, available: String },
+    NoSuchLayer {
+        wanted: String,
+        available: String,
+    },
     Form(String),
+    /// Reading failed.
+    Read(io::Error),
+    /// Writing failed.
     Io(io::Error),
 }
 
@@ -162,9 +175,21 @@ impl Fault {
         Self::Unsupported(reason.to_string())
     }
 
+    /// A failure to read, which is damage where the file ends too early.
+    pub(crate) fn reading(error: io::Error) -> Self {
+        match error.kind() {
+            io::ErrorKind::UnexpectedEof => Self::damaged("it ends too early"),
+            _ => Self::Read(error),
+        }
+    }
+
     /// Names the file and the format of its image.
     pub(crate) fn of(self, file: impl fmt::Display, format: Format) -> Error {
-        self.named(file, format.name())
+        match self {
+            Self::TooLarge(reason) if format.by_rows() => Error::TooLarge { file: file.to_string(), reason, advice: BY_ROWS },
+            Self::TooLarge(reason) => Error::TooLarge { file: file.to_string(), reason, advice: NOT_BY_ROWS },
+            other => other.named(file, format.name()),
+        }
     }
 
     /// Names the file and its format.
@@ -174,9 +199,10 @@ impl Fault {
         match self {
             Self::Damaged(reason) => Error::Damaged { file, format, reason },
             Self::Unsupported(reason) => Error::Unsupported { file, format, reason },
-            Self::TooLarge(reason) => Error::TooLarge { file, reason },
+            Self::TooLarge(reason) => Error::TooLarge { file, reason, advice: RAISE },
             Self::NoSuchLayer { wanted, available } => Error::NoSuchLayer { file, wanted, available },
             Self::Form(reason) => Error::Form { file, reason },
+            Self::Read(source) => Error::read(file, source),
             Self::Io(source) => Error::write(file, source),
         }
     }

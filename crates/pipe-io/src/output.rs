@@ -34,7 +34,7 @@ pub fn encode(target: &Target, picture: &Picture, options: &WriteOptions) -> Res
     Ok(bytes)
 }
 
-fn encode_to(out: &mut dyn Write, target: &Target, picture: &Picture, options: &WriteOptions) -> Result<()> {
+pub(crate) fn encode_to(out: &mut dyn Write, target: &Target, picture: &Picture, options: &WriteOptions) -> Result<()> {
     let tag = options.colorspace != Some(Colorspace::Raw);
     let format = target.format;
     shielded(|| {
@@ -53,20 +53,35 @@ fn encode_to(out: &mut dyn Write, target: &Target, picture: &Picture, options: &
         }
         out.write_all(seekable.get_ref()).map_err(Fault::Io)
     })
-    .map_err(|fault| match fault {
+    .map_err(|fault| named(target, fault))
+}
+
+/// What an encoder has to say about the file that it was to write.
+pub(crate) fn named(target: &Target, fault: Fault) -> Error {
+    match fault {
         // An encoder that gives up has met a picture it cannot hold, not a damaged file.
-        Fault::Damaged(reason) => Fault::Form(reason).of(target, format),
-        other => other.of(target, format),
-    })
+        Fault::Damaged(reason) => Fault::Form(reason).of(target, target.format),
+        other => other.of(target, target.format),
+    }
 }
 
 /// Checks that the picture is whole and in the form that its target wants.
 pub(crate) fn check(target: &Target, picture: &Picture, options: &WriteOptions) -> Result<()> {
     let refuse = |reason: String| Error::Form { file: target.to_string(), reason };
     let expected = Picture::byte_count(picture.width, picture.height, picture.channels, picture.sample);
-    if picture.width == 0 || picture.height == 0 || expected != Some(picture.bytes.len()) {
+    if expected != Some(picture.bytes.len()) {
         let (w, h, bytes) = (picture.width, picture.height, picture.bytes.len());
         return Err(refuse(format!("{bytes} bytes are no picture of {w}×{h} pixels")));
+    }
+    check_form(target, picture, options)
+}
+
+/// The same for a picture whose pixels are not there yet.
+pub(crate) fn check_form(target: &Target, picture: &Picture, options: &WriteOptions) -> Result<()> {
+    let refuse = |reason: String| Error::Form { file: target.to_string(), reason };
+    if picture.width == 0 || picture.height == 0 {
+        let (w, h) = (picture.width, picture.height);
+        return Err(refuse(format!("{w}×{h} pixels are no picture")));
     }
     let largest = match target.format {
         Format::Jpeg | Format::Gif => 65_535,

@@ -10,7 +10,7 @@ use std::fs::File;
 use std::io::{self, Read};
 use std::path::{Path, PathBuf};
 
-use crate::error::{Error, Fault, Result};
+use crate::error::{Error, Fault, RAISE, Result};
 use crate::volume::VolumeFormat;
 
 /// A file format for images.
@@ -110,6 +110,11 @@ impl Format {
         matches!(self, Self::Gif | Self::Apng)
     }
 
+    /// Whether pictures of this format are read and written by bands of rows without being held whole.
+    pub const fn by_rows(self) -> bool {
+        matches!(self, Self::Exr | Self::Png | Self::Tiff | Self::Pfm | Self::Npy)
+    }
+
     /// The format that a file name's extension stands for, in any case.
     pub fn of_extension(path: &Path) -> Option<Self> {
         let extension = path.extension()?.to_str()?.to_ascii_lowercase();
@@ -122,6 +127,25 @@ impl Format {
 
     pub(crate) fn known_extensions() -> String {
         Self::ALL.map(|format| format!(".{}", format.extensions()[0])).join(" ")
+    }
+}
+
+/// How much of a picture is looked at, which is what has to be within the [`Limits`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Extent {
+    /// All of it is decoded at once.
+    Whole,
+    /// Bands of rows are, whose size is checked when they are asked for.
+    Rows,
+}
+
+impl Extent {
+    /// How many of `height` rows are held before any is asked for: all, or one.
+    pub(crate) fn rows(self, height: u64) -> u64 {
+        match self {
+            Self::Whole => height,
+            Self::Rows => height.min(1),
+        }
     }
 }
 
@@ -141,6 +165,11 @@ impl Default for Limits {
 }
 
 impl Limits {
+    /// Checks a declared size of which only some is held at once.
+    pub(crate) fn check_extent(&self, extent: Extent, width: u64, height: u64, bytes_per_pixel: u64) -> Result<(), Fault> {
+        self.check(width, extent.rows(height), bytes_per_pixel)
+    }
+
     /// Checks a declared size; `bytes_per_pixel` over all channels that will be held.
     pub(crate) fn check(&self, width: u64, height: u64, bytes_per_pixel: u64) -> Result<(), Fault> {
         if width == 0 || height == 0 {
@@ -250,7 +279,7 @@ pub(crate) fn load(source: &Source, limits: &Limits) -> Result<Vec<u8>> {
     }
     if bytes.len() as u64 > limits.max_bytes {
         let reason = format!("it has more than {} bytes", limits.max_bytes);
-        return Err(Error::TooLarge { file: source.to_string(), reason });
+        return Err(Error::TooLarge { file: source.to_string(), reason, advice: RAISE });
     }
     Ok(bytes)
 }

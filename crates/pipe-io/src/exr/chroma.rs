@@ -30,7 +30,7 @@ pub(super) fn read(opened: &Opened, bytes: &[u8], limits: &Limits) -> Result<Vec
     }
     limits.check(data.width.into(), data.height.into(), 16)?;
 
-    let planes = decode::read(opened, bytes, &opened.layer.channels, Sample::F32, data)?;
+    let planes = decode::read(opened, &bytes, &opened.layer.channels, Sample::F32, data)?;
     let planes: Vec<f32> = planes.as_chunks::<4>().0.iter().map(|&four| f32::from_ne_bytes(four)).collect();
     let (w, h) = (data.width as usize, data.height as usize);
     let (y_plane, rest) = planes.split_at(w * h);

@@ -19,22 +19,41 @@ use super::{Opened, fault};
 use crate::error::Fault;
 use crate::guard::shielded;
 use crate::picture::{Sample, Window};
+use crate::store::Store;
 
 /// Reads `channels` (indices into the part's; `None` reads as zeros) as planes one after another. Each plane covers
 /// `view`, in the file's coordinates, divided by its channel's sampling; outside the data window it is zero.
-pub(super) fn read(opened: &Opened, bytes: &[u8], channels: &[Option<usize>], sample: Sample, view: Window) -> Result<Vec<u8>, Fault> {
-    let part = opened.part();
-    let planes: Vec<Plane> = channels.iter().map(|&index| Plane::new(part, index, sample, view)).collect();
-    let total = planes.iter().map(Plane::bytes).sum();
+pub(super) fn read(
+    opened: &Opened,
+    store: &impl Store,
+    channels: &[Option<usize>],
+    sample: Sample,
+    view: Window,
+) -> Result<Vec<u8>, Fault> {
+    let planes = Planes::new(opened.part(), channels, sample, view);
     // Zeroed pages come from the system untouched, so a file that lies about its size (within the limits) costs no
     // memory until its blocks really arrive.
-    let mut pixels = vec![0; total];
-
-    let grid = Grid::new(opened, part);
-    let offsets = grid.offsets(opened, bytes)?;
-    let bands = split(&grid, &planes, &mut pixels, opened.data, view);
-    bands.into_par_iter().try_for_each(|band| shielded(|| band.decode(opened, bytes, &grid, &offsets, &planes, sample, view)))?;
+    let mut pixels = vec![0; planes.bytes()];
+    let stripe = Stripe { planes: &planes, rows: 0..view.height as usize, pixels: &mut pixels };
+    Blocks::locate(opened, store)?.decode(opened, store, vec![stripe])?;
     Ok(pixels)
+}
+
+/// Where channels are decoded to: planes one after another, that cover a window of the file.
+pub(super) struct Planes {
+    list: Vec<Plane>,
+    view: Window,
+    sample: Sample,
+}
+
+impl Planes {
+    pub(super) fn new(part: &Part, channels: &[Option<usize>], sample: Sample, view: Window) -> Self {
+        Self { list: channels.iter().map(|&index| Plane::new(part, index, sample, view)).collect(), view, sample }
+    }
+
+    pub(super) fn bytes(&self) -> usize {
+        self.list.iter().map(Plane::bytes).sum()
+    }
 }
 
 /// How one channel lies in its plane.
@@ -62,61 +81,73 @@ impl Plane {
     }
 }
 
+/// Rows of planes that are to be decoded.
+pub(super) struct Stripe<'a> {
+    pub(super) planes: &'a Planes,
+    /// Which, counted from the top of the planes' view.
+    pub(super) rows: Range<usize>,
+    /// All planes, not only these rows.
+    pub(super) pixels: &'a mut [u8],
+}
+
 /// The blocks of the full-resolution level.
-struct Grid {
+pub(super) struct Blocks {
     /// Pixels of a whole block.
-    block: (usize, usize),
+    size: (usize, usize),
     /// Blocks across and down.
     count: (usize, usize),
     tiled: bool,
     /// Whether each chunk begins with the number of its part.
     numbered: bool,
+    /// Where they are in the file, row by row.
+    offsets: Vec<u64>,
 }
 
-impl Grid {
-    fn new(opened: &Opened, part: &Part) -> Self {
+impl Blocks {
+    /// Reads the table of blocks. The full-resolution level comes first in every table, whatever other levels follow.
+    pub(super) fn locate(opened: &Opened, store: &impl Store) -> Result<Self, Fault> {
         let (width, height) = (opened.data.width as usize, opened.data.height as usize);
-        let (block, tiled) = match part.blocks {
-            BlockDescription::Tiles(tiles) => ((tiles.tile_size.0, tiles.tile_size.1), true),
-            BlockDescription::ScanLines => ((width, part.compression.scan_lines_per_block()), false),
-        };
-        let count = (width.div_ceil(block.0), height.div_ceil(block.1));
-        Self { block, count, tiled, numbered: opened.meta.requirements.is_multilayer() }
-    }
-
-    /// The file offsets of the blocks, row by row. The full-resolution level comes first in every table, whatever
-    /// other levels follow.
-    fn offsets(&self, opened: &Opened, bytes: &[u8]) -> Result<Vec<usize>, Fault> {
-        let count = self.count.0 * self.count.1;
-        let table = bytes
-            .get(opened.table..)
-            .and_then(|rest| rest.get(..count.checked_mul(8)?))
-            .ok_or_else(|| Fault::damaged("it ends within its table of blocks"))?;
+        let (size, tiled) = block_size(opened);
+        let count = (width.div_ceil(size.0), height.div_ceil(size.1));
+        let short = || Fault::damaged("it ends within its table of blocks");
+        let bytes = count.0.checked_mul(count.1).and_then(|blocks| blocks.checked_mul(8)).ok_or_else(short)?;
+        let table = store.bytes(opened.table, bytes)?.ok_or_else(short)?;
         let offsets = table.as_chunks::<8>().0.iter().map(|&eight| {
-            usize::try_from(u64::from_le_bytes(eight))
-                .ok()
-                .filter(|&offset| offset >= opened.table && offset < bytes.len())
+            Some(u64::from_le_bytes(eight))
+                .filter(|&offset| offset >= opened.table && offset < store.length())
                 .ok_or_else(|| Fault::damaged("blocks are missing: writing it was interrupted, or it was cut off"))
         });
-        offsets.collect()
+        let offsets = offsets.collect::<Result<_, _>>()?;
+        Ok(Self { size, count, tiled, numbered: opened.meta.requirements.is_multilayer(), offsets })
+    }
+
+    /// Decodes rows into their planes, which are zero there. No two stripes share a row of blocks, or it is decoded twice.
+    pub(super) fn decode(&self, opened: &Opened, store: &impl Store, stripes: Vec<Stripe>) -> Result<(), Fault> {
+        let bands: Vec<Band> = stripes.into_iter().flat_map(|stripe| self.split(stripe, opened.data)).collect();
+        bands.into_par_iter().try_for_each(|band| shielded(|| band.decode(opened, store, self)))
+    }
+
+    /// The rows of the data window that are decoded together with row `y` of it.
+    pub(super) fn around(&self, y: usize, data: Window) -> Range<usize> {
+        let start = y - y % self.size.1;
+        start..(start + self.size.1).min(data.height as usize)
     }
 
     /// Columns and rows of a block, relative to the data window.
     fn area(&self, opened: &Opened, column: usize, row: usize) -> (Range<usize>, Range<usize>) {
         let (width, height) = (opened.data.width as usize, opened.data.height as usize);
-        let (x, y) = (column * self.block.0, row * self.block.1);
-        (x..(x + self.block.0).min(width), y..(y + self.block.1).min(height))
+        let (x, y) = (column * self.size.0, row * self.size.1);
+        (x..(x + self.size.0).min(width), y..(y + self.size.1).min(height))
     }
 
     /// Cuts one chunk out of the file and checks that it is the one the table promised.
-    fn chunk(&self, opened: &Opened, bytes: &[u8], at: usize, column: usize, row: usize) -> Result<Chunk, Fault> {
+    fn chunk(&self, opened: &Opened, store: &impl Store, column: usize, row: usize) -> Result<Chunk, Fault> {
         let short = || Fault::damaged("a block runs past the end of the file");
-        let mut rest = &bytes[at..];
-        let mut int = || {
-            let (four, tail) = rest.split_first_chunk::<4>().ok_or_else(short)?;
-            rest = tail;
-            Ok::<i32, Fault>(i32::from_le_bytes(*four))
-        };
+        let ints = 2 + usize::from(self.numbered) + if self.tiled { 3 } else { 0 };
+        let at = self.offsets[row * self.count.0 + column];
+        let head = store.bytes(at, ints * 4)?.ok_or_else(short)?;
+        let mut rest = head.as_chunks::<4>().0.iter().map(|&four| i32::from_le_bytes(four));
+        let mut int = || rest.next().ok_or_else(short);
         let wrong = || Fault::damaged("its table of blocks points to the wrong places");
         if self.numbered && int()? as usize != opened.layer.part {
             return Err(wrong());
@@ -126,82 +157,89 @@ impl Grid {
             if place != [column as i32, row as i32, 0, 0] {
                 return Err(wrong());
             }
-        } else if i64::from(int()?) != i64::from(opened.data.y) + (row * self.block.1) as i64 {
+        } else if i64::from(int()?) != i64::from(opened.data.y) + (row * self.size.1) as i64 {
             return Err(wrong());
         }
         let length = usize::try_from(int()?).map_err(|_| short())?;
-        let compressed = rest.get(..length).ok_or_else(short)?.to_vec();
+        let compressed = store.bytes(at + head.len() as u64, length)?.ok_or_else(short)?;
         let compressed_block = if self.tiled {
             let coordinates = TileCoordinates { tile_index: Vec2(column, row), level_index: Vec2(0, 0) };
             CompressedBlock::Tile(CompressedTileBlock { coordinates, compressed_pixels_le: compressed })
         } else {
-            let y_coordinate = opened.data.y + (row * self.block.1) as i32;
+            let y_coordinate = opened.data.y + (row * self.size.1) as i32;
             CompressedBlock::ScanLine(CompressedScanLineBlock { y_coordinate, compressed_pixels_le: compressed })
         };
         Ok(Chunk { layer_index: opened.layer.part, compressed_block })
+    }
+
+    /// Cuts a stripe into bands that can be decoded at the same time.
+    fn split<'a>(&self, stripe: Stripe<'a>, data: Window) -> Vec<Band<'a>> {
+        let Stripe { planes, rows, pixels } = stripe;
+        let mut rest: Vec<(usize, &mut [u8])> = Vec::new();
+        let mut remaining = pixels;
+        for plane in &planes.list {
+            let (own, tail) = remaining.split_at_mut(plane.bytes());
+            rest.push((0, own));
+            remaining = tail;
+        }
+        let shift = i64::from(data.y) - i64::from(planes.view.y);
+        let clamp = |y: usize| (y as i64 + shift).clamp(rows.start as i64, rows.end as i64) as usize;
+        let mut bands = Vec::new();
+        for row in 0..self.count.1 {
+            let end = ((row + 1) * self.size.1).min(data.height as usize);
+            let seen = clamp(row * self.size.1)..clamp(end);
+            if seen.is_empty() {
+                continue;
+            }
+            let mut slices = Vec::new();
+            for (plane, (next, bytes)) in planes.list.iter().zip(&mut rest) {
+                let own = seen.start.div_ceil(plane.sampling.1)..seen.end.div_ceil(plane.sampling.1);
+                let before = (own.start - *next) * plane.row_bytes();
+                let length = own.len() * plane.row_bytes();
+                let (taken, tail) = std::mem::take(bytes)[..].split_at_mut(before + length);
+                *bytes = tail;
+                *next = own.end;
+                slices.push((own.start, &mut taken[before..]));
+            }
+            bands.push(Band { row, planes, seen, rows: slices });
+        }
+        bands
+    }
+}
+
+/// Pixels of a whole block, and whether blocks are tiles.
+pub(super) fn block_size(opened: &Opened) -> ((usize, usize), bool) {
+    let part = opened.part();
+    match part.blocks {
+        BlockDescription::Tiles(tiles) => ((tiles.tile_size.0, tiles.tile_size.1), true),
+        BlockDescription::ScanLines => ((opened.data.width as usize, part.compression.scan_lines_per_block()), false),
     }
 }
 
 /// One row of blocks and the rows of every plane that it fills.
 struct Band<'a> {
     row: usize,
+    planes: &'a Planes,
+    /// The rows of the view that are wanted of it.
+    seen: Range<usize>,
     /// For each plane: its first row here, and the bytes of its rows.
     rows: Vec<(usize, &'a mut [u8])>,
 }
 
-fn split<'a>(grid: &Grid, planes: &[Plane], pixels: &'a mut [u8], data: Window, view: Window) -> Vec<Band<'a>> {
-    let mut rest: Vec<(usize, &mut [u8])> = Vec::new();
-    let mut remaining = pixels;
-    for plane in planes {
-        let (own, tail) = remaining.split_at_mut(plane.bytes());
-        rest.push((0, own));
-        remaining = tail;
-    }
-    let shift = i64::from(data.y) - i64::from(view.y);
-    let mut bands = Vec::new();
-    for row in 0..grid.count.1 {
-        let clamp = |y: usize| (y as i64 + shift).clamp(0, i64::from(view.height)) as usize;
-        let end = ((row + 1) * grid.block.1).min(data.height as usize);
-        let seen = clamp(row * grid.block.1)..clamp(end);
-        let mut rows = Vec::new();
-        for (plane, (next, bytes)) in planes.iter().zip(&mut rest) {
-            let own = seen.start.div_ceil(plane.sampling.1)..seen.end.div_ceil(plane.sampling.1);
-            let before = (own.start - *next) * plane.row_bytes();
-            let length = own.len() * plane.row_bytes();
-            let (taken, tail) = std::mem::take(bytes)[..].split_at_mut(before + length);
-            *bytes = tail;
-            *next = own.end;
-            rows.push((own.start, &mut taken[before..]));
-        }
-        if !seen.is_empty() {
-            bands.push(Band { row, rows });
-        }
-    }
-    bands
-}
-
 impl Band<'_> {
-    #[allow(clippy::too_many_arguments)] // one call, and each argument is a plain part of the picture of the work
-    fn decode(
-        mut self,
-        opened: &Opened,
-        bytes: &[u8],
-        grid: &Grid,
-        offsets: &[usize],
-        planes: &[Plane],
-        sample: Sample,
-        view: Window,
-    ) -> Result<(), Fault> {
+    fn decode(mut self, opened: &Opened, store: &impl Store, blocks: &Blocks) -> Result<(), Fault> {
         let part = opened.part();
+        let Planes { list: planes, view, sample } = self.planes;
+        let sample = *sample;
         let shift_x = i64::from(opened.data.x) - i64::from(view.x);
         let shift_y = i64::from(opened.data.y) - i64::from(view.y);
-        for column in 0..grid.count.0 {
-            let (xs, ys) = grid.area(opened, column, self.row);
+        for column in 0..blocks.count.0 {
+            let (xs, ys) = blocks.area(opened, column, self.row);
             let visible = (xs.start as i64 + shift_x).max(0)..(xs.end as i64 + shift_x).min(i64::from(view.width));
             if visible.is_empty() {
                 continue;
             }
-            let chunk = grid.chunk(opened, bytes, offsets[self.row * grid.count.0 + column], column, self.row)?;
+            let chunk = blocks.chunk(opened, store, column, self.row)?;
             let block = decompress(&opened.meta, part, chunk, xs.len(), ys.clone())?;
             let mut at = 0;
             for y in ys {
@@ -210,7 +248,7 @@ impl Band<'_> {
                     let line = block.get(at..at + length).ok_or_else(|| Fault::damaged("a block is too short"))?;
                     at += length;
                     let target_y = y as i64 + shift_y;
-                    if target_y < 0 || target_y >= i64::from(view.height) {
+                    if target_y < self.seen.start as i64 || target_y >= self.seen.end as i64 {
                         continue;
                     }
                     for (plane, (first, rows)) in planes.iter().zip(&mut self.rows) {

@@ -9,6 +9,7 @@
 //! - [`layer`]: which channels a name after `#` means
 //! - [`decode`]: blocks → planes
 //! - [`chroma`]: subsampled luminance/chroma → RGB
+//! - [`rows`]: a band of rows of a file that stays on disk
 //! - [`encode`]: planes → blocks
 
 mod attributes;
@@ -16,47 +17,39 @@ mod chroma;
 mod decode;
 mod encode;
 mod layer;
+mod rows;
 
-use std::io::Cursor;
+use std::io::{BufRead, Cursor, Seek};
 
 use exr::meta::header::Header as Part;
 use exr::meta::{BlockDescription, MetaData};
 use exr::prelude::{IntegerBounds, SampleType};
 
 pub use self::attributes::Attributes;
-pub(crate) use self::encode::encode;
+pub(crate) use self::encode::{RowEncoder, encode};
+pub(crate) use self::rows::open as open_rows;
 
 use self::layer::{Layer, Meaning};
 use crate::colour::{Colour, Primaries, Transfer};
 use crate::error::Fault;
 use crate::picture::{Alpha, Channels, Header, Layout, Metadata, Picture, Sample, Window};
-use crate::source::{Format, Limits};
+use crate::source::{Extent, Format, Limits};
 
 /// Reads the header alone. `length` is the length of the whole file, of which `bytes` may be only the beginning.
 pub(crate) fn header(bytes: &[u8], length: u64, layer: Option<&str>, limits: &Limits) -> Result<Header, Fault> {
-    Ok(Opened::parse(bytes, length, layer, limits)?.describe())
+    Ok(Opened::parse(&mut Cursor::new(bytes), length, layer, limits, Extent::Whole)?.describe())
 }
 
 /// Reads one layer.
 pub(crate) fn decode(bytes: &[u8], layer: Option<&str>, limits: &Limits) -> Result<Picture, Fault> {
-    let opened = Opened::parse(bytes, bytes.len() as u64, layer, limits)?;
+    let opened = Opened::parse(&mut Cursor::new(bytes), bytes.len() as u64, layer, limits, Extent::Whole)?;
     let about = opened.describe();
     let pixels = if opened.layer.meaning == Meaning::LuminanceChroma {
         chroma::read(&opened, bytes, limits)?
     } else {
-        decode::read(&opened, bytes, &opened.layer.channels, about.sample, opened.display)?
+        decode::read(&opened, &bytes, &opened.layer.channels, about.sample, opened.display)?
     };
-    Ok(Picture {
-        width: about.width,
-        height: about.height,
-        sample: about.sample,
-        layout: Layout::Planar,
-        channels: about.channels,
-        alpha: about.alpha,
-        colour: about.colour,
-        bytes: pixels,
-        metadata: about.metadata,
-    })
+    Ok(about.picture(Layout::Planar, pixels))
 }
 
 /// A file whose header was found sound, and the layer that will be read.
@@ -67,7 +60,7 @@ struct Opened {
     /// The chosen one.
     layer: Layer,
     /// Where the offset table of the chosen part begins in the file.
-    table: usize,
+    table: u64,
     /// The part's pixels, in the file's coordinates.
     data: Window,
     /// What becomes the picture, in the file's coordinates.
@@ -75,9 +68,8 @@ struct Opened {
 }
 
 impl Opened {
-    fn parse(bytes: &[u8], length: u64, wanted: Option<&str>, limits: &Limits) -> Result<Self, Fault> {
-        let mut cursor = Cursor::new(bytes);
-        let meta = MetaData::read_from_buffered(&mut cursor, false).map_err(fault)?;
+    fn parse(file: &mut (impl BufRead + Seek), length: u64, wanted: Option<&str>, limits: &Limits, extent: Extent) -> Result<Self, Fault> {
+        let meta = MetaData::read_from_buffered(&mut *file, false).map_err(fault)?;
         if meta.requirements.has_deep_data || meta.headers.iter().any(|part| part.deep) {
             return Err(Fault::unsupported("deep pixels; flatten the image in the program that made it"));
         }
@@ -89,7 +81,7 @@ impl Opened {
         }
         // The table has eight bytes a chunk, and each chunk at least eight more: counts beyond that are not in the
         // file. This comes before anything is allocated or counted by the declared size.
-        let tables = cursor.position();
+        let tables = file.stream_position().map_err(Fault::reading)?;
         let chunks = meta.headers.iter().map(|part| part.chunk_count as u128).sum::<u128>();
         if u128::from(tables) + chunks * 16 > u128::from(length) {
             return Err(Fault::damaged(format!("it is cut off: its {chunks} blocks do not fit in {length} bytes")));
@@ -104,20 +96,20 @@ impl Opened {
         let layers = layer::all(&meta.headers);
         let layer = layer::choose(&layers, &meta.headers, wanted)?;
         let part = &meta.headers[layer.part];
-        let before = meta.headers[..layer.part].iter().map(|part| part.chunk_count).sum::<usize>();
+        let before = meta.headers[..layer.part].iter().map(|part| part.chunk_count as u64).sum::<u64>();
         let (data, display) = (window(part.data_window())?, window(part.shared_attributes.display_window)?);
         let all_channels = part.channels.bytes_per_pixel as u64;
-        limits.check(data.width.into(), data.height.into(), all_channels)?;
+        limits.check_extent(extent, data.width.into(), data.height.into(), all_channels)?;
         let raw = u128::from(data.width) * u128::from(data.height) * u128::from(all_channels);
         let subsampled = part.channels.list.iter().any(|channel| channel.sampling != exr::math::Vec2(1, 1));
         if largest_ratio(part.compression).is_some_and(|ratio| !subsampled && raw > u128::from(length) * ratio) {
             return Err(Fault::damaged(format!("{length} bytes cannot hold the {raw} bytes of pixels it declares")));
         }
-        limits.check(display.width.into(), display.height.into(), layer.channels.len() as u64 * 4)?;
+        limits.check_extent(extent, display.width.into(), display.height.into(), layer.channels.len() as u64 * 4)?;
         if matches!(part.compression, exr::prelude::Compression::HTJ2K32 | exr::prelude::Compression::HTJ2K256) {
             return Err(Fault::unsupported("HTJ2K compression; save it with ZIP or PIZ"));
         }
-        Ok(Self { layers, layer, table: tables as usize + before * 8, data, display, meta })
+        Ok(Self { layers, layer, table: tables + before * 8, data, display, meta })
     }
 
     fn part(&self) -> &Part {

@@ -3,23 +3,27 @@
 //!
 //! Written uncompressed by default: TIFF is what one hands to another program, and the next program reads that fastest.
 
-use std::io::{Cursor, Seek, Write};
+use std::io::{Cursor, Read, Seek};
 
 use tiff::decoder::{BufferLayoutPreference, Decoder, DecodingResult, Limits as Memory};
-use tiff::encoder::{DeflateLevel, TiffEncoder, colortype};
-use tiff::tags::{ExtraSamples, Tag};
+use tiff::tags::Tag;
 use tiff::{ColorType, TiffError};
 
 use crate::colour::Colour;
 use crate::error::Fault;
-use crate::form::Compression;
 use crate::icc;
 use crate::picture::{Alpha, Channels, Header, Layout, Metadata, Picture, Sample};
 use crate::raster;
-use crate::source::{Format, Limits};
+use crate::source::{Extent, Format, Limits};
 
-struct Opened<'a> {
-    decoder: Decoder<Cursor<&'a [u8]>>,
+mod encode;
+mod rows;
+
+pub(crate) use self::encode::{Strips, encode};
+pub(crate) use self::rows::open as open_rows;
+
+struct Opened<R: Read + Seek> {
+    decoder: Decoder<R>,
     header: Header,
     kind: ColorType,
     layout: BufferLayoutPreference,
@@ -27,14 +31,14 @@ struct Opened<'a> {
     orientation: u16,
 }
 
-fn open<'a>(bytes: &'a [u8], limits: &Limits) -> Result<Opened<'a>, Fault> {
+fn open<R: Read + Seek>(file: R, limits: &Limits, extent: Extent) -> Result<Opened<R>, Fault> {
     let mut memory = Memory::default();
     memory.decoding_buffer_size = limits.max_bytes as usize;
     memory.intermediate_buffer_size = limits.max_bytes as usize;
     memory.ifd_value_size = 64 << 20;
-    let mut decoder = Decoder::new(Cursor::new(bytes)).map_err(fault)?.with_limits(memory);
+    let mut decoder = Decoder::new(file).map_err(fault)?.with_limits(memory);
     let (width, height) = decoder.dimensions().map_err(fault)?;
-    limits.check(width.into(), height.into(), 16)?;
+    limits.check_extent(extent, width.into(), height.into(), 16)?;
     let kind = decoder.colortype().map_err(fault)?;
     let layout = decoder.image_buffer_layout().map_err(fault)?;
     let channels = match kind {
@@ -84,7 +88,7 @@ fn open<'a>(bytes: &'a [u8], limits: &Limits) -> Result<Opened<'a>, Fault> {
 }
 
 pub(crate) fn header(bytes: &[u8], limits: &Limits, profiles: bool) -> Result<Header, Fault> {
-    let opened = open(bytes, limits)?;
+    let opened = open(Cursor::new(bytes), limits, Extent::Whole)?;
     let mut header = opened.header;
     if raster::exif_orientation(opened.orientation).is_some_and(raster::swaps_sides) {
         std::mem::swap(&mut header.width, &mut header.height);
@@ -94,21 +98,10 @@ pub(crate) fn header(bytes: &[u8], limits: &Limits, profiles: bool) -> Result<He
 }
 
 pub(crate) fn decode(bytes: &[u8], limits: &Limits, profiles: bool) -> Result<Picture, Fault> {
-    let Opened { mut decoder, header, kind, layout, profile, orientation } = open(bytes, limits)?;
+    let Opened { mut decoder, header, kind, layout, profile, orientation } = open(Cursor::new(bytes), limits, Extent::Whole)?;
     let mut decoded = DecodingResult::U8(Vec::new());
     decoder.read_image_to_buffer(&mut decoded).map_err(fault)?;
-    let mut pixels = match decoded {
-        DecodingResult::U8(values) => values,
-        DecodingResult::U16(values) => bytemuck::cast_slice(&values).to_vec(),
-        DecodingResult::F16(values) => values.iter().flat_map(|value| value.to_bits().to_ne_bytes()).collect(),
-        DecodingResult::F32(values) => bytemuck::cast_slice(&values).to_vec(),
-        DecodingResult::F64(values) => values.iter().flat_map(|&value| (value as f32).to_ne_bytes()).collect(),
-        _ => return Err(Fault::unsupported("signed or 32-bit integer samples")),
-    };
-    let (width, height) = (header.width as usize, header.height as usize);
-    if let ColorType::Gray(bits @ (1 | 2 | 4)) = kind {
-        pixels = unpack(&pixels, width, height, bits)?;
-    }
+    let pixels = samples(decoded, kind, header.width as usize, header.height as usize)?;
     let expected = Picture::byte_count(header.width, header.height, header.channels, header.sample);
     if expected != Some(pixels.len()) {
         return Err(Fault::damaged("its pixels do not fill its size"));
@@ -122,6 +115,22 @@ pub(crate) fn decode(bytes: &[u8], limits: &Limits, profiles: bool) -> Result<Pi
         picture = raster::orient(picture, orientation);
     }
     icc::apply(profile.as_deref().filter(|_| profiles), picture)
+}
+
+/// What was decoded, as the bytes of a picture of this size.
+fn samples(decoded: DecodingResult, kind: ColorType, width: usize, height: usize) -> Result<Vec<u8>, Fault> {
+    let bytes = match decoded {
+        DecodingResult::U8(values) => values,
+        DecodingResult::U16(values) => bytemuck::cast_slice(&values).to_vec(),
+        DecodingResult::F16(values) => values.iter().flat_map(|value| value.to_bits().to_ne_bytes()).collect(),
+        DecodingResult::F32(values) => bytemuck::cast_slice(&values).to_vec(),
+        DecodingResult::F64(values) => values.iter().flat_map(|&value| (value as f32).to_ne_bytes()).collect(),
+        _ => return Err(Fault::unsupported("signed or 32-bit integer samples")),
+    };
+    match kind {
+        ColorType::Gray(bits @ (1 | 2 | 4)) => unpack(&bytes, width, height, bits),
+        _ => Ok(bytes),
+    }
 }
 
 /// Grey of 1, 2 or 4 bits, rows padded to bytes → 8 bits.
@@ -156,62 +165,11 @@ fn interleave(picture: Picture) -> Picture {
     Picture { layout: Layout::Interleaved, bytes, ..picture }
 }
 
-pub(crate) fn encode(out: &mut (impl Write + Seek), picture: &Picture, compression: Compression) -> Result<(), Fault> {
-    let mut encoder = TiffEncoder::new(out).map_err(failure)?.with_compression(match compression {
-        Compression::Lzw => tiff::encoder::Compression::Lzw,
-        Compression::Deflate => tiff::encoder::Compression::Deflate(DeflateLevel::default()),
-        Compression::Packbits => tiff::encoder::Compression::Packbits,
-        _ => tiff::encoder::Compression::Uncompressed,
-    });
-    let grey = picture.channels.is_grey();
-    match (picture.sample, grey) {
-        (Sample::U8, true) => write::<colortype::Gray8, _>(&mut encoder, picture, &picture.bytes),
-        (Sample::U8, false) => write::<colortype::RGB8, _>(&mut encoder, picture, &picture.bytes),
-        (Sample::U16, true) => write::<colortype::Gray16, _>(&mut encoder, picture, &words(&picture.bytes)),
-        (Sample::U16, false) => write::<colortype::RGB16, _>(&mut encoder, picture, &words(&picture.bytes)),
-        (Sample::F32, true) => write::<colortype::Gray32Float, _>(&mut encoder, picture, &floats(&picture.bytes)),
-        (Sample::F32, false) => write::<colortype::RGB32Float, _>(&mut encoder, picture, &floats(&picture.bytes)),
-        (Sample::F16, _) => Err(Fault::Form("TIFF holds u8, u16 or float, not half".to_owned())),
-    }
-}
-
-fn write<C: colortype::ColorType, W: Write + Seek>(
-    encoder: &mut TiffEncoder<W>,
-    picture: &Picture,
-    values: &[C::Inner],
-) -> Result<(), Fault>
-where
-    [C::Inner]: tiff::encoder::TiffValue,
-{
-    let mut image = encoder.new_image::<C>(picture.width, picture.height).map_err(failure)?;
-    match picture.alpha {
-        Alpha::None => {}
-        Alpha::Associated => image.extra_samples(&[ExtraSamples::AssociatedAlpha]).map_err(failure)?,
-        Alpha::Straight => image.extra_samples(&[ExtraSamples::UnassociatedAlpha]).map_err(failure)?,
-    }
-    image.write_data(values).map_err(failure)
-}
-
-fn words(bytes: &[u8]) -> Vec<u16> {
-    bytes.as_chunks::<2>().0.iter().map(|&word| u16::from_ne_bytes(word)).collect()
-}
-
-fn floats(bytes: &[u8]) -> Vec<f32> {
-    bytes.as_chunks::<4>().0.iter().map(|&word| f32::from_ne_bytes(word)).collect()
-}
-
 fn fault(error: TiffError) -> Fault {
     match error {
         TiffError::UnsupportedError(error) => Fault::unsupported(error),
         TiffError::LimitsExceeded => Fault::TooLarge("it needs more memory than the limit".to_owned()),
         TiffError::IoError(_) => Fault::damaged("it ends too early"),
         other => Fault::damaged(other),
-    }
-}
-
-fn failure(error: TiffError) -> Fault {
-    match error {
-        TiffError::IoError(error) => Fault::Io(error),
-        other => Fault::Form(other.to_string()),
     }
 }
