@@ -140,7 +140,7 @@ fn declared_reach(graph: &Graph, limits: &Limits) -> Option<[u32; 2]> {
         let Item::Pass(pass) = item else { return None };
         let mut own = [0, 0];
         for read in &pass.reads {
-            let words = matches!(passes.resource(read.resource).shape, Shape::Words { .. });
+            let words = matches!(passes.resource(read.resource).shape, Shape::Words { .. } | Shape::Pixels { .. });
             let known = matches!(passes.resource(read.resource).origin, Origin::Literal(_));
             let far = match read.reach {
                 _ if words || known => [0, 0],

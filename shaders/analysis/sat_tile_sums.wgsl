@@ -21,7 +21,8 @@ fn main(
     @builtin(local_invocation_index) lane: u32,
 ) {
     let size = size_image();
-    let origin = vec2i(group.xy) * SIDE;
+    let tile_at = block(group);
+    let origin = tile_at * SIDE;
     for (var y = i32(local.y); y < SIDE; y += LANES_Y) {
         for (var x = i32(local.x); x < SIDE; x += 16) {
             let xy = origin + vec2i(x, y);
@@ -40,14 +41,14 @@ fn main(
             sum += tile[cell(x, i)];
         }
         if origin.y + i < size.y {
-            put_rows(i32(group.x) * size.y + origin.y + i, sum);
+            put_rows(tile_at.x * size.y + origin.y + i, sum);
         }
     } else {
         for (var y = 0; y < SIDE; y++) {
             sum += tile[cell(i, y)];
         }
         if origin.x + i < size.x {
-            put_columns(i32(group.y) * size.x + origin.x + i, sum);
+            put_columns(tile_at.y * size.x + origin.x + i, sum);
         }
     }
 }

@@ -22,7 +22,8 @@ fn main(
     @builtin(local_invocation_index) lane: u32,
 ) {
     let size = size_image();
-    let origin = vec2i(group.xy) * SIDE;
+    let tile_at = block(group);
+    let origin = tile_at * SIDE;
     for (var y = i32(local.y); y < SIDE; y += LANES_Y) {
         for (var x = i32(local.x); x < SIDE; x += 16) {
             let xy = origin + vec2i(x, y);
@@ -45,7 +46,7 @@ fn main(
     workgroupBarrier();
     var before = Texel();
     if origin.y + i < size.y {
-        before = left_at(i32(group.x) * size.y + origin.y + i);
+        before = left_at(tile_at.x * size.y + origin.y + i);
     }
     for (var x = QUARTER - 1; x < first; x += QUARTER) {
         before += tile[cell(x, i)];
@@ -67,7 +68,7 @@ fn main(
     workgroupBarrier();
     before = Texel();
     if origin.x + i < size.x {
-        before = edges_at(i32(group.y) * size.x + origin.x + i);
+        before = edges_at(tile_at.y * size.x + origin.x + i);
     }
     error = Texel();
     for (var y = QUARTER - 1; y < first; y += QUARTER) {

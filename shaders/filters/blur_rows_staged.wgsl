@@ -13,7 +13,7 @@ fn place(row: i32, i: i32) -> i32 {
 
 @compute @workgroup_size(LANES, HEIGHT)
 fn main(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_id) local: vec3u) {
-    let origin = vec2i(group.xy) * vec2i(WIDTH, HEIGHT);
+    let origin = block(group) * vec2i(WIDTH, HEIGHT);
     let lane = i32(local.x);
     let row = i32(local.y);
     for (var i = lane; i < WIDTH + 2 * RADIUS; i += LANES) {

@@ -1,7 +1,7 @@
 // Pixels as they lie in a file → linear Rec.709, associated alpha.
 //
 // Constants: CHANNELS (1..4), BYTES of a sample, FLOATING, TRANSFER (0 linear, 1 sRGB, 2 gamma), STRAIGHT,
-// HAS_ALPHA, CONVERT (apply the matrix), PLANAR, WIDTH. The function `word(c, i)`, added behind this file, reads
+// HAS_ALPHA, CONVERT (apply the matrix), PLANAR. The function `word(c, i)`, added behind this file, reads
 // the i-th 32-bit word of plane c (of plane 0 when interleaved).
 
 import package::lib::half::half_to_float;
@@ -25,7 +25,8 @@ fn stored(c: i32, pixel: i32) -> f32 {
 }
 
 fn decode(x: i32, row: i32) -> vec4f {
-    let p = row * WIDTH + x;
+    let place = vec2i(x, row) - first_c0();
+    let p = place.y * held_c0().x + place.x;
     var rgb = vec3f(stored(0, p));
     if CHANNELS >= 3 {
         rgb = vec3f(rgb.x, stored(1, p), stored(2, p));

@@ -1,7 +1,7 @@
 // Linear Rec.709, associated alpha → pixels as they will lie in a file.
 //
 // One call packs the pixels of whole words: 4 of 8 bits, 2 of 16 bits, 1 of 32 bits. Constants as in ingest.wgsl,
-// with ROWS of this band and FIRST_ROW; GREY takes the luminance of a colour image. The function
+// and FIRST_ROW, where the band begins; GREY takes the luminance of a colour image. The function
 // `put(c, i, bits)`, added behind this file, stores the i-th word of plane c.
 
 import package::lib::color::luminance;
@@ -10,7 +10,8 @@ import package::lib::number::is_nan;
 import package::lib::transfer::{linear_to_srgb, gamma_transfer};
 
 fn encode(pixel: i32) -> vec4f {
-    let v = load_image(vec2i(pixel % WIDTH, FIRST_ROW + pixel / WIDTH));
+    let columns = held_c0().x;
+    let v = load_image(first_c0() + vec2i(pixel % columns, FIRST_ROW + pixel / columns));
     var rgb = v.rgb;
     if STRAIGHT && v.a != 0.0 {
         rgb /= v.a;
@@ -52,7 +53,7 @@ fn component(v: vec4f, c: i32) -> f32 {
 
 fn each(group: i32) {
     let pixels = 4 / BYTES;
-    let count = WIDTH * ROWS;
+    let count = held_c0().x * held_c0().y;
     if PLANAR {
         var words = array<u32, 4>();
         for (var k = 0; k < pixels; k++) {

@@ -41,7 +41,7 @@ fn kick(s: Quad, l: vec4f, lv: vec4f, at: vec2i) -> Quad {
 fn main(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) lane: u32) {
     let x = i32(lane % 64u);
     let q = i32(lane / 64u) * 4;
-    let at = vec2i(group.xy) * (SIDE - 2 * STEPS) - STEPS + vec2i(x, q * 4);
+    let at = block(group) * (SIDE - 2 * STEPS) - STEPS + vec2i(x, q * 4);
     let down = vec2i(0, 4);
     var a = load_quad(at);
     var b = load_quad(at + down);

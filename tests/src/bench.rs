@@ -13,7 +13,7 @@ use pipe_graph::pass::Limits;
 use pipe_graph::reference::{Tensor, evaluate};
 use pipe_graph::resolve::{Request, resolve};
 use pipe_graph::types::{EdgeType, Element, ImageType, VolumeType};
-use pipe_plan::lower::{Rim, lower};
+use pipe_plan::lower::Rim;
 use pipe_plan::{Options, Plan};
 
 use crate::scattered;
@@ -65,8 +65,7 @@ pub fn compile(text: &str, inputs: &[(&str, EdgeType)]) -> Result<Graph, String>
 
 /// Plans a graph.
 pub fn plan(graph: &Graph, limits: &Limits, options: &Options) -> Result<Plan, String> {
-    let passes = lower(graph, &Rim::default(), limits).map_err(|e| e.to_string())?;
-    pipe_plan::plan(&graph.name, passes, limits, options).map_err(|e| e.to_string())
+    pipe_plan::plan_graph(graph, &Rim::default(), limits, options, &|_| true).map_err(|e| e.to_string())
 }
 
 /// The values of a graph's outputs by name.

@@ -176,6 +176,7 @@ pub(crate) fn limits(adapter: &wgpu::Adapter) -> Limits {
         half_storage: adapter.features().contains(Features::TEXTURE_ADAPTER_SPECIFIC_FORMAT_FEATURES) && half.into_iter().all(storable),
         // What a GPU has free, no portable interface tells.
         budget: if cpu { available_memory() } else { None },
+        tiled: false,
     }
 }
 

@@ -118,6 +118,9 @@ pub enum GpuError {
         /// What does not fit.
         reason: String,
     },
+    /// The caller could not bring or take the pixels of a tile.
+    #[error("{0}")]
+    Exchange(String),
     /// The user interrupted the run.
     #[error("interrupted")]
     Interrupted,

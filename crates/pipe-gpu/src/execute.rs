@@ -12,16 +12,17 @@ use std::sync::{Arc, PoisonError};
 use std::time::{Duration, Instant};
 
 use indexmap::IndexMap;
-use pipe_plan::plan::Plan;
+use pipe_plan::plan::{Crossing, Plan};
 
 use crate::device::Device;
 use crate::error::GpuError;
 use crate::history::Histories;
 use crate::patience::Patience;
 use crate::pipelines::Pipelines;
-use crate::prepare::{Prepared, kernel_names};
+use crate::prepare::{Prepared, Ready, ReadyTiles, kernel_names};
 use crate::record::Recorder;
 use crate::storage::{self, Memory, Pool};
+use crate::tiles::{self, Exchange, InMemory};
 use crate::transfer::{Transfer, copy_out};
 
 /// How to run.
@@ -170,12 +171,26 @@ impl Executor {
 
     /// Uploads, runs, and brings back. `inputs` are the host's bytes of each external.
     pub fn run(&mut self, prepared: &Prepared, inputs: &HashMap<&str, &[u8]>, options: &RunOptions<'_>) -> Result<Outputs, GpuError> {
+        let mut pictures = InMemory::new(inputs);
+        let mut outputs = self.run_through(prepared, inputs, &mut pictures, options)?;
+        outputs.fetched.extend(pictures.into_outputs());
+        Ok(outputs)
+    }
+
+    /// Like [`Executor::run`], but what is made tile by tile goes through `exchange`.
+    pub fn run_through(
+        &mut self,
+        prepared: &Prepared,
+        inputs: &HashMap<&str, &[u8]>,
+        exchange: &mut dyn Exchange,
+        options: &RunOptions<'_>,
+    ) -> Result<Outputs, GpuError> {
         let mut fetched = IndexMap::new();
         for fetch in &prepared.plan.fetches {
             let bytes = fetch.parts.iter().map(|(_, range)| range.end).max().unwrap_or(0);
             fetched.insert(fetch.name.clone(), vec![0; bytes as usize]);
         }
-        let timings = self.run_into(prepared, inputs, options, &mut |part| {
+        let timings = self.run_into(prepared, inputs, exchange, options, &mut |part| {
             if let Some(whole) = fetched.get_mut(part.name) {
                 copy_out(&mut whole[part.range.start as usize..part.range.end as usize], part.bytes);
             }
@@ -184,11 +199,13 @@ impl Executor {
     }
 
     /// Like [`Executor::run`], but hands the bytes that come back out as they arrive, still in mapped memory, without
-    /// a copy: parts of a fetch in the order of the plan, each in one or more pieces.
+    /// a copy: parts of a fetch in the order of the plan, each in one or more pieces. What is made tile by tile goes
+    /// through `exchange`.
     pub fn run_into(
         &mut self,
         prepared: &Prepared,
         inputs: &HashMap<&str, &[u8]>,
+        exchange: &mut dyn Exchange,
         options: &RunOptions<'_>,
         take: &mut dyn FnMut(Part<'_>),
     ) -> Result<Timings, GpuError> {
@@ -207,16 +224,15 @@ impl Executor {
             self.transfer.upload(&self.device, buffer, source, &upload.ranges, &patience, &upload.name)?;
         }
         timings.upload_ms = millis(started);
-
-        let started = Instant::now();
         self.histories.recall(&self.device, plan, &prepared.memory);
-        let costs = prepared.costs.lock().unwrap_or_else(PoisonError::into_inner).clone();
-        let mut recorder = Recorder::new(&self.device, &mut self.transfer, &prepared.names, costs, *options, patience);
-        recorder.steps(&prepared.steps)?;
-        let (passes, learned) = recorder.finish()?;
-        *prepared.costs.lock().unwrap_or_else(PoisonError::into_inner) = learned;
-        timings.passes = passes;
-        timings.compute_ms = millis(started);
+
+        let run = Running { prepared, options, patience: &patience };
+        for steps in prepared.steps.chunk_by(|a, b| !matches!(a, Ready::Tiles(_)) && !matches!(b, Ready::Tiles(_))) {
+            match steps {
+                [Ready::Tiles(tiles)] => self.tiles(&run, tiles, exchange, &mut timings)?,
+                _ => self.launch(&run, steps, None, &mut timings)?,
+            }
+        }
 
         let started = Instant::now();
         self.histories.keep(&self.device, plan, &prepared.memory)?;
@@ -228,8 +244,73 @@ impl Executor {
             let start = range.start + at;
             take(Part { name, range: start..start + bytes.len() as u64, bytes });
         })?;
-        timings.readback_ms = millis(started);
+        timings.readback_ms += millis(started);
         Ok(timings)
+    }
+
+    /// Records, submits and waits for steps; `groups` are those of a tile's launches, from an id on.
+    fn launch(
+        &mut self,
+        run: &Running<'_>,
+        steps: &[Ready],
+        groups: Option<(usize, &[[u32; 3]])>,
+        timings: &mut Timings,
+    ) -> Result<(), GpuError> {
+        let started = Instant::now();
+        let Running { prepared, options, patience } = *run;
+        let costs = prepared.costs.lock().unwrap_or_else(PoisonError::into_inner).clone();
+        let mut recorder = Recorder::new(&self.device, &mut self.transfer, &prepared.names, costs, *options, *patience);
+        if let Some((first_id, groups)) = groups {
+            recorder = recorder.with_groups(first_id, groups);
+        }
+        recorder.steps(steps)?;
+        let (passes, learned) = recorder.finish()?;
+        *prepared.costs.lock().unwrap_or_else(PoisonError::into_inner) = learned;
+        for (name, ms) in passes {
+            *timings.passes.entry(name).or_default() += ms;
+        }
+        timings.compute_ms += millis(started);
+        Ok(())
+    }
+
+    /// Runs the body for every tile.
+    fn tiles(&mut self, run: &Running<'_>, tiles: &ReadyTiles, exchange: &mut dyn Exchange, timings: &mut Timings) -> Result<(), GpuError> {
+        let Running { prepared, options, patience } = *run;
+        let plan = &prepared.plan;
+        let tiling = tiles::tiling(plan, tiles.step)?;
+        let mut encoder = self.device.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+        tiles.clears.iter().for_each(|memory| memory.zero(&mut encoder));
+        self.device.queue.submit([encoder.finish()]);
+        for (done, tile) in tiling.tiles.iter().enumerate() {
+            let started = Instant::now();
+            for from in &tile.uploads {
+                let held = exchange.rows(from).map_err(GpuError::Exchange)?;
+                let buffer = memory(prepared, from.slot)?.buffer(&plan.name)?;
+                self.transfer.upload(&self.device, buffer, held.bytes, &from.ranges(&held.rows), patience, &from.name)?;
+            }
+            if let Some(buffer) = &prepared.uniforms {
+                tiles::place(&self.device, plan, buffer, tile);
+            }
+            timings.upload_ms += millis(started);
+
+            self.launch(run, &tiles.body, Some((tiles.first_id, &tile.groups)), timings)?;
+
+            let started = Instant::now();
+            let mut taken: Vec<Vec<u8>> = tile.fetches.iter().map(|to| vec![0; to.bytes() as usize]).collect();
+            let one = |to: &Crossing| Ok((memory(prepared, to.slot)?.buffer(&plan.name)?, to.bytes()));
+            let buffers = tile.fetches.iter().map(one).collect::<Result<Vec<_>, GpuError>>()?;
+            self.transfer.download(&self.device, &buffers, patience, &plan.name, &mut |i, at, bytes| {
+                copy_out(&mut taken[i][at as usize..at as usize + bytes.len()], bytes);
+            })?;
+            timings.readback_ms += millis(started);
+            for (to, bytes) in tile.fetches.iter().zip(&taken) {
+                exchange.put(to, bytes).map_err(GpuError::Exchange)?;
+            }
+            if let Some(progress) = options.progress {
+                progress(done as u32 + 1, tiling.tiles.len() as u32);
+            }
+        }
+        Ok(())
     }
 
     fn write_literals(&mut self, prepared: &Prepared) -> Result<(), GpuError> {
@@ -240,6 +321,14 @@ impl Executor {
         }
         Ok(())
     }
+}
+
+/// What all parts of a run share.
+#[derive(Clone, Copy)]
+struct Running<'a> {
+    prepared: &'a Prepared,
+    options: &'a RunOptions<'a>,
+    patience: &'a Patience<'a>,
 }
 
 fn memory(prepared: &Prepared, slot: pipe_plan::plan::SlotId) -> Result<&Memory, GpuError> {

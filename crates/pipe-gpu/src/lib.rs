@@ -21,6 +21,7 @@ pub mod probe;
 mod record;
 mod stopwatch;
 mod storage;
+mod tiles;
 mod transfer;
 
 pub use adapter::{AdapterDescription, Choice, OpenOptions, enumerate, enumerate_with};
@@ -29,3 +30,4 @@ pub use error::GpuError;
 pub use execute::{Executor, Outputs, Part, RunOptions, Timings};
 pub use formats::FormatSupport;
 pub use prepare::Prepared;
+pub use tiles::{Exchange, InMemory, Rows};

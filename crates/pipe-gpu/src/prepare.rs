@@ -3,7 +3,7 @@
 use std::sync::{Arc, Mutex};
 
 use pipe_graph::pass::Profile;
-use pipe_plan::plan::{Binding, Launch, Plan, Repeat, Run, SlotId, Step, Times};
+use pipe_plan::plan::{Binding, Launch, Plan, Repeat, Run, SlotId, Step, Tiling, Times};
 
 use crate::device::Device;
 use crate::error::GpuError;
@@ -31,6 +31,16 @@ pub(crate) struct Costs(pub(crate) Vec<f64>);
 pub(crate) enum Ready {
     Run(ReadyRun),
     Repeat(ReadyRepeat),
+    Tiles(ReadyTiles),
+}
+
+pub(crate) struct ReadyTiles {
+    pub(crate) clears: Vec<Memory>,
+    pub(crate) body: Vec<Ready>,
+    /// [`ReadyRun::id`] of the body's first launch; the others follow.
+    pub(crate) first_id: usize,
+    /// Position of the [`Step::Tiles`] in the plan, which says what differs from tile to tile.
+    pub(crate) step: usize,
 }
 
 pub(crate) struct ReadyRun {
@@ -75,7 +85,12 @@ impl Prepared {
     ) -> Result<Self, GpuError> {
         let mut maker =
             Maker { device, plan: &plan, memory: &memory, uniforms: uniforms.as_ref(), pipelines, names: Vec::new(), costs: Vec::new() };
-        let steps = maker.all(&plan.steps)?;
+        let mut steps = maker.all(&plan.steps)?;
+        for (i, step) in steps.iter_mut().enumerate() {
+            if let Ready::Tiles(tiles) = step {
+                tiles.step = i;
+            }
+        }
         let Maker { names, costs, .. } = maker;
         let pipelines = pipelines.len();
         Ok(Self { plan, memory, uniforms, steps, names, costs: Mutex::new(Costs(costs)), pipelines })
@@ -93,6 +108,7 @@ pub(crate) fn kernel_names(plan: &Plan) -> Vec<String> {
                     }
                 }
                 Step::Repeat(r) => [&r.first, &r.odd, &r.even].into_iter().for_each(|s| visit(s, names)),
+                Step::Tiles(t) => visit(&t.body, names),
             }
         }
     }
@@ -123,6 +139,7 @@ impl Maker<'_> {
             .map(|step| match step {
                 Step::Run(run) => Ok(Ready::Run(self.run(run)?)),
                 Step::Repeat(repeat) => Ok(Ready::Repeat(self.repeat(repeat)?)),
+                Step::Tiles(tiling) => Ok(Ready::Tiles(self.tiles(tiling)?)),
             })
             .collect()
     }
@@ -143,6 +160,12 @@ impl Maker<'_> {
         };
         let settle = settle.collect::<Result<_, GpuError>>()?;
         Ok(ReadyRepeat { name: r.name.clone(), first, odd, even, count: r.count.clone(), settle, values })
+    }
+
+    fn tiles(&mut self, t: &Tiling) -> Result<ReadyTiles, GpuError> {
+        let clears = t.clears.iter().map(|slot| Ok(self.memory(*slot, &t.name)?.clone())).collect::<Result<_, GpuError>>()?;
+        let first_id = self.names.len();
+        Ok(ReadyTiles { clears, body: self.all(&t.body)?, first_id, step: 0 })
     }
 
     fn run(&mut self, run: &Run) -> Result<ReadyRun, GpuError> {

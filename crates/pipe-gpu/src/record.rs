@@ -57,6 +57,8 @@ pub(crate) struct Recorder<'a> {
     /// How many loops are running, one in the other.
     depth: u32,
     reported: Instant,
+    /// Workgroups of the launches from an id on, where they differ from what was prepared.
+    groups: Option<(usize, &'a [[u32; 3]])>,
 }
 
 /// What a submission holds.
@@ -95,7 +97,14 @@ impl<'a> Recorder<'a> {
             ahead: usize::from(device.limits().profile == Profile::Gpu),
             depth: 0,
             reported: now,
+            groups: None,
         }
+    }
+
+    /// With these workgroups for the launches from an id on.
+    pub(crate) fn with_groups(mut self, first_id: usize, groups: &'a [[u32; 3]]) -> Self {
+        self.groups = Some((first_id, groups));
+        self
     }
 
     /// Records steps, submitting as it goes.
@@ -103,6 +112,7 @@ impl<'a> Recorder<'a> {
         steps.iter().try_for_each(|step| match step {
             Ready::Run(run) => self.run(run),
             Ready::Repeat(repeat) => self.repeat(repeat),
+            Ready::Tiles(_) => unreachable!("tiles stand outside all other steps, and are run by the executor"),
         })
     }
 
@@ -180,6 +190,10 @@ impl<'a> Recorder<'a> {
     }
 
     fn run(&mut self, run: &ReadyRun) -> Result<(), GpuError> {
+        let groups = self.groups.map_or(run.groups, |(first, groups)| groups[run.id - first]);
+        if groups.contains(&0) {
+            return Ok(());
+        }
         let cost = self.costs.0[run.id];
         if self.batch.launches > 0 && (self.batch.cost + cost > AIM || self.batch.launches >= MOST_LAUNCHES) {
             self.submit()?;
@@ -191,7 +205,7 @@ impl<'a> Recorder<'a> {
         let stamp = self.stopwatch.as_mut().and_then(|s| s.start(name));
         match (&run.pipeline.launch, &run.target) {
             (Compiled::Points(pipeline), Some(target)) => self.draw(run, pipeline, target, name, stamp.as_ref()),
-            (Compiled::Compute(pipeline), _) => self.dispatch(run, pipeline, name, stamp.as_ref()),
+            (Compiled::Compute(pipeline), _) => self.dispatch((run, groups), pipeline, name, stamp.as_ref()),
             (Compiled::Points(_), None) => unreachable!("preparing points looks for their target"),
         }
         self.batch.launches += 1;
@@ -237,7 +251,13 @@ impl<'a> Recorder<'a> {
         pass.draw(0..run.groups[0], 0..1);
     }
 
-    fn dispatch(&mut self, run: &ReadyRun, pipeline: &wgpu::ComputePipeline, name: &str, stamp: Option<&(wgpu::QuerySet, u32)>) {
+    fn dispatch(
+        &mut self,
+        (run, [x, y, z]): (&ReadyRun, [u32; 3]),
+        pipeline: &wgpu::ComputePipeline,
+        name: &str,
+        stamp: Option<&(wgpu::QuerySet, u32)>,
+    ) {
         if stamp.is_some() {
             self.pass = None;
         }
@@ -253,7 +273,6 @@ impl<'a> Recorder<'a> {
         });
         pass.set_pipeline(pipeline);
         pass.set_bind_group(0, &run.group, &[]);
-        let [x, y, z] = run.groups;
         pass.dispatch_workgroups(x, y, z);
     }
 

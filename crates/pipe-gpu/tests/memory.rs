@@ -8,7 +8,7 @@ use std::collections::HashMap;
 use std::sync::Arc;
 
 use common::{Draft, INCREMENT, executor, executors, grey, once, run, uints};
-use pipe_gpu::{Choice, Executor, GpuError, RunOptions};
+use pipe_gpu::{Choice, Executor, GpuError, InMemory, RunOptions};
 use pipe_plan::Plan;
 use pipe_plan::plan::{Binding, History, Step, Storage};
 
@@ -112,7 +112,8 @@ fn fetched_bytes_can_be_taken_without_a_copy() {
         let data = numbers(1000);
         let mut sum = 0_u64;
         let mut end = 0;
-        e.run_into(&prepared, &HashMap::from([("in", data.as_slice())]), &RunOptions::default(), &mut |part| {
+        let inputs = HashMap::from([("in", data.as_slice())]);
+        e.run_into(&prepared, &inputs, &mut InMemory::new(&inputs), &RunOptions::default(), &mut |part| {
             assert_eq!((part.name, part.range.start), ("out", end));
             end = part.range.end;
             sum += uints(part.bytes).into_iter().map(u64::from).sum::<u64>();

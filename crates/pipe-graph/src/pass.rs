@@ -46,10 +46,18 @@ pub enum Shape {
     },
     /// Four floats.
     Scalar,
-    /// Raw 32-bit words: pixels as they lie in a file, on their way in or out. Seen by shaders as a table of u32.
+    /// Raw 32-bit words: voxels as they lie in a file, on their way in or out. Seen by shaders as a table of u32.
     Words {
         /// Number of 32-bit words.
         len: u32,
+    },
+    /// Pixels as they lie in a file, on their way in or out: rows without padding, the last word filled up. Seen by
+    /// shaders as a table of u32.
+    Pixels {
+        /// Width and height.
+        size: [u32; 2],
+        /// Bytes of one pixel; of one of its samples where each channel lies in a plane of its own.
+        pixel: u32,
     },
 }
 
@@ -59,8 +67,26 @@ impl Shape {
         match self {
             Self::Image(t) => t.size[0] as u64 * t.size[1] as u64 * t.channels as u64 * t.precision.bytes(),
             Self::Volume(t) => t.size[0] as u64 * t.size[1] as u64 * t.size[2] as u64 * t.channels as u64 * t.precision.bytes(),
-            Self::Table { len, .. } | Self::Words { len } => *len as u64 * 4,
+            Self::Table { .. } | Self::Words { .. } | Self::Pixels { .. } => self.entries() as u64 * 4,
             Self::Scalar => 16,
+        }
+    }
+
+    /// Entries of a table or of what is seen as one; 1 of anything else.
+    pub const fn entries(&self) -> u32 {
+        match self {
+            Self::Table { len, .. } | Self::Words { len } => *len,
+            Self::Pixels { size, pixel } => (size[0] as u64 * size[1] as u64 * *pixel as u64).div_ceil(4) as u32,
+            _ => 1,
+        }
+    }
+
+    /// Width and height of an image, or of pixels of a file.
+    pub const fn plane(&self) -> Option<[u32; 2]> {
+        match self {
+            Self::Image(t) => Some(t.size),
+            Self::Pixels { size, .. } => Some(*size),
+            _ => None,
         }
     }
 
@@ -282,6 +308,12 @@ pub enum Grid {
     Elements([u32; 3]),
     /// This many workgroups of a `Kernel`.
     Groups([u32; 3]),
+    /// One call of `Each`, or one workgroup of a `Kernel`, for each block of so many pixels: block (i, j) holds those from
+    /// (i·w, j·h) on. The pixels are those of the first image that is written, or else of the image that is read once;
+    /// a block writes no others, and reads no others of what it reads once. A `Kernel` asks `block(group)` which is its.
+    Blocks([u32; 2]),
+    /// One call for each so many pixels of the first output, pixels of a file.
+    Pixels(u32),
 }
 
 /// A constant of the shader module: part of the kernel's text.
@@ -469,6 +501,9 @@ pub struct Limits {
     pub half_storage: bool,
     /// Bytes that may be alive at once, staging included; `None` when nobody knows.
     pub budget: Option<u64>,
+    /// Whether images are to be made tile by tile, since they do not fit whole: passes of bounded reach are wanted.
+    #[serde(skip)]
+    pub tiled: bool,
 }
 
 impl Default for Limits {
@@ -485,6 +520,7 @@ impl Default for Limits {
             max_groups: 65535,
             half_storage: true,
             budget: None,
+            tiled: false,
         }
     }
 }

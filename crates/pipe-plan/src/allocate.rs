@@ -15,14 +15,16 @@
 //! freed last; for intervals that uses exactly as many slots as are alive at once.
 
 use std::collections::BTreeMap;
+use std::ops::Range;
 
 use pipe_graph::pass::{Access, Count, Entry, Grid, Limits, Origin, Reach, ResourceId, Shader, Shape, Value};
 use pipe_graph::types::Precision;
 
-use crate::compose::{Composed, Composer};
-use crate::kernel_pass::{KernelPass, LoopOp, Op, Ops, PassWrite, Source, Stage, StagePort};
-use crate::plan::{Fetched, History, Plan, Repeat, Run, Slot, SlotId, Step, Storage, Times, Upload};
+use crate::compose::{Composed, Composer, Cover, Place, Placed};
+use crate::kernel_pass::{Brought, KernelPass, LoopOp, Op, Ops, PassWrite, Portion, Source, Stage, StagePort, TilingOp};
+use crate::plan::{Crossing, Fetched, History, Plan, Rect, Repeat, Run, Slot, SlotId, Step, Storage, Tile, Tiling, Times, Upload};
 use crate::schedule::Schedule;
+use crate::window::{Halo, Windows};
 use crate::{Options, PlanError};
 
 /// Index of a value.
@@ -31,6 +33,7 @@ struct ValueId(usize);
 
 /// One content of storage, from the step that writes it to the last step that reads it.
 struct Held {
+    resource: ResourceId,
     storage: Storage,
     from: usize,
     to: usize,
@@ -43,6 +46,7 @@ type Names = BTreeMap<ResourceId, ValueId>;
 enum Draft {
     Run(RunDraft),
     Repeat(RepeatDraft),
+    Tiles(TilesDraft),
 }
 
 struct RunDraft {
@@ -63,25 +67,33 @@ struct RepeatDraft {
     settle: Vec<(ValueId, ValueId)>,
 }
 
+struct TilesDraft {
+    windows: Windows,
+    work: f32,
+    body: Vec<Draft>,
+    clears: Vec<ValueId>,
+    uploads: Vec<(Brought, ValueId)>,
+    fetches: Vec<(Brought, ValueId)>,
+}
+
 /// Makes the plan.
 pub(crate) fn allocate(name: &str, schedule: Schedule, limits: &Limits, options: &Options) -> Result<Plan, PlanError> {
-    let ops = schedule.ops;
-    let readers = readers(&ops);
-    let mut player = Player { ops: &ops, composer: Composer::new(limits, &ops), readers, held: Vec::new(), time: 1 };
+    let Schedule { ops, portions } = schedule;
+    let readers = readers(&ops, &portions);
+    let composer = Composer::new(limits, &ops);
+    let mut player = Player { ops: &ops, composer, readers, held: Vec::new(), time: 1, windows: None };
     let mut names = Names::new();
-    // Literals, uploads and recalled history are there before the first step.
-    let mut given: Vec<ResourceId> = Vec::new();
-    for op in &ops.ops {
-        given.extend(op.sources());
-    }
-    given.extend(ops.wanted());
-    given.sort_unstable();
-    given.dedup();
-    given.retain(|id| !matches!(ops.resources[id.index()].origin, Origin::Pass | Origin::State));
+    let given = given(&ops, &portions);
     for id in &given {
         names.insert(*id, player.begin(*id, 0));
     }
-    let drafts = player.region(&ops.ops, &mut names)?;
+    let mut drafts = Vec::new();
+    for portion in &portions {
+        match portion {
+            Portion::Whole(list) => drafts.extend(player.region(list, &mut names)?),
+            Portion::Tiles(tiling) => drafts.push(player.tiles(tiling, &mut names)?),
+        }
+    }
     let end = player.time + 1;
     for id in ops.wanted() {
         player.held[names[&id].0].to = end;
@@ -114,7 +126,7 @@ pub(crate) fn allocate(name: &str, schedule: Schedule, limits: &Limits, options:
     });
     let histories = histories.collect();
 
-    let mut writer = Writer { ops: &ops, slot_of: &slot_of, uniforms: Vec::new(), bytes_moved: 0 };
+    let mut writer = Writer { ops: &ops, slot_of: &slot_of, uniforms: Vec::new(), bytes_moved: 0, placed: Vec::new() };
     let steps = writer.steps(drafts);
     let peak_bytes = slots.iter().map(|s| s.storage.bytes()).sum();
     let naive_bytes = held.iter().map(|h| h.storage.bytes()).sum();
@@ -136,8 +148,23 @@ pub(crate) fn allocate(name: &str, schedule: Schedule, limits: &Limits, options:
     })
 }
 
+/// What is there before the first step: literals, uploads, recalled values of earlier frames.
+fn given(ops: &Ops, portions: &[Portion]) -> Vec<ResourceId> {
+    let mut given: Vec<ResourceId> = portions.iter().flat_map(Portion::ops).flat_map(Op::sources).chain(ops.wanted()).collect();
+    given.sort_unstable();
+    given.dedup();
+    given.retain(|id| !matches!(ops.resources[id.index()].origin, Origin::Pass | Origin::State));
+    // What tiles need is brought for each.
+    for portion in portions {
+        if let Portion::Tiles(tiling) = portion {
+            given.retain(|id| !tiling.uploads.iter().any(|u| u.resource == *id));
+        }
+    }
+    given
+}
+
 /// How many operations read each resource; what must stay has one reader more.
-fn readers(ops: &Ops) -> BTreeMap<ResourceId, usize> {
+fn readers(ops: &Ops, portions: &[Portion]) -> BTreeMap<ResourceId, usize> {
     fn walk(list: &[Op], count: &mut BTreeMap<ResourceId, usize>) {
         for op in list {
             match op {
@@ -150,7 +177,7 @@ fn readers(ops: &Ops) -> BTreeMap<ResourceId, usize> {
         }
     }
     let mut count = BTreeMap::new();
-    walk(&ops.ops, &mut count);
+    portions.iter().for_each(|p| walk(p.ops(), &mut count));
     ops.wanted().for_each(|id| *count.entry(id).or_default() += 1);
     count
 }
@@ -163,7 +190,8 @@ fn recalled(ops: &Ops, given: &[ResourceId], wanted: &str) -> Option<ResourceId>
 
 /// Refuses what cannot run before anything is allocated.
 fn check(ops: &Ops, held: &[Held], slots: &[Slot], limits: &Limits, options: &Options) -> Result<(), PlanError> {
-    for r in &ops.resources {
+    for value in held {
+        let r = &ops.resources[value.resource.index()];
         match r.shape {
             Shape::Image(t) if t.size.iter().any(|n| *n > limits.max_image) => {
                 return Err(PlanError::ImageTooLarge { name: r.name.clone(), size: t.size, most: limits.max_image });
@@ -171,18 +199,18 @@ fn check(ops: &Ops, held: &[Held], slots: &[Slot], limits: &Limits, options: &Op
             Shape::Volume(t) if t.size.iter().any(|n| *n > limits.max_volume) => {
                 return Err(PlanError::VolumeTooLarge { name: r.name.clone(), size: t.size, most: limits.max_volume });
             }
-            Shape::Table { .. } | Shape::Words { .. } if r.shape.bytes() > limits.max_binding_bytes => {
+            Shape::Table { .. } | Shape::Words { .. } | Shape::Pixels { .. } if r.shape.bytes() > limits.max_binding_bytes => {
                 return Err(PlanError::TableTooLarge { name: r.name.clone(), bytes: r.shape.bytes(), most: limits.max_binding_bytes });
             }
             _ => {}
         }
     }
     let needed: u64 = slots.iter().map(|s| s.storage.bytes()).sum();
-    match options.budget.or(limits.budget) {
+    match options.budget.into_iter().chain(limits.budget).min() {
         Some(budget) if needed > budget => {
-            let largest = ops.resources.iter().max_by_key(|r| r.shape.bytes()).map(|r| (r.name.clone(), r.shape.bytes()));
-            let (name, bytes) = largest.unwrap_or_default();
-            Err(PlanError::Budget { needed, budget, alive: held.len(), name, bytes })
+            let largest = held.iter().max_by_key(|value| value.storage.bytes());
+            let (name, bytes) = largest.map(|v| (ops.resources[v.resource.index()].name.clone(), v.storage.bytes())).unwrap_or_default();
+            Err(PlanError::Budget { needed, budget, name, bytes })
         }
         _ => Ok(()),
     }
@@ -203,7 +231,9 @@ fn storage(shape: Shape, limits: &Limits) -> Storage {
             }
             Storage::Volume(t)
         }
-        Shape::Table { .. } | Shape::Words { .. } | Shape::Scalar => Storage::Buffer { bytes: shape.bytes().next_multiple_of(16).max(16) },
+        Shape::Table { .. } | Shape::Words { .. } | Shape::Pixels { .. } | Shape::Scalar => {
+            Storage::Buffer { bytes: shape.bytes().next_multiple_of(16).max(16) }
+        }
     }
 }
 
@@ -237,13 +267,15 @@ struct Player<'a> {
     held: Vec<Held>,
     /// The current step; 0 is before the first.
     time: usize,
+    /// Of the tiles that are being played.
+    windows: Option<&'a Windows>,
 }
 
-impl Player<'_> {
+impl<'a> Player<'a> {
     /// A new value of this resource's storage.
     fn begin(&mut self, id: ResourceId, from: usize) -> ValueId {
         let storage = storage(self.ops.shape(id), self.composer.limits());
-        self.held.push(Held { storage, from, to: from });
+        self.held.push(Held { resource: id, storage, from, to: from });
         ValueId(self.held.len() - 1)
     }
 
@@ -272,17 +304,55 @@ impl Player<'_> {
                 let value = self.begin(write.resource, self.time);
                 e.insert(value);
             }
-            if write.in_place_of.is_none() && write.access != Access::Store {
+            // What tiles add to is cleared before the first of them.
+            if self.windows.is_none() && write.in_place_of.is_none() && write.access != Access::Store {
                 clears.push(names[&write.resource]);
             }
         }
-        let composed = self.composer.compose(pass)?;
+        let composed = self.composer.compose(pass, self.windows)?;
         let slots: Vec<ValueId> = composed.resources.iter().map(|id| names[id]).collect();
         for value in &slots {
             self.touch(*value);
         }
         self.time += 1;
         Ok(Draft::Run(RunDraft { pass: pass.clone(), composed, slots, clears }))
+    }
+
+    /// Plays the body once. What it leaves whole, and what it reads from outside, lives from the first tile to the last.
+    fn tiles(&mut self, tiling: &'a TilingOp, names: &mut Names) -> Result<Draft, PlanError> {
+        let start = self.time;
+        let mut lasting: Vec<ValueId> = names.values().copied().collect();
+        let mut clears = Vec::new();
+        for write in tiling.body.iter().filter_map(|op| if let Op::Pass(pass) = op { Some(&pass.writes) } else { None }).flatten() {
+            if tiling.windows.halos.contains_key(&write.resource) || write.in_place_of.is_some() {
+                continue;
+            }
+            let value = self.begin(write.resource, start);
+            names.insert(write.resource, value);
+            lasting.push(value);
+            if write.access != Access::Store {
+                clears.push(value);
+            }
+        }
+        let mut uploads = Vec::new();
+        for upload in &tiling.uploads {
+            let value = self.begin(upload.resource, start);
+            names.insert(upload.resource, value);
+            uploads.push((upload.clone(), value));
+        }
+        self.windows = Some(&tiling.windows);
+        let body = self.region(&tiling.body, names)?;
+        self.windows = None;
+        let fetches: Vec<_> = tiling.fetches.iter().map(|f| (f.clone(), names[&f.resource])).collect();
+        let used = used(&body);
+        let taken = fetches.iter().map(|(_, value)| *value);
+        for value in used.into_iter().filter(|v| lasting.contains(v)).chain(taken) {
+            self.touch(value);
+        }
+        // The end is a moment of its own: nothing may take a slot before it.
+        self.time += 1;
+        let (windows, work) = (tiling.windows.clone(), tiling.work);
+        Ok(Draft::Tiles(TilesDraft { windows, work, body, clears, uploads, fetches }))
     }
 
     fn repeat(&mut self, l: &LoopOp, names: &mut Names) -> Result<Vec<Draft>, PlanError> {
@@ -465,6 +535,7 @@ fn used(drafts: &[Draft]) -> Vec<ValueId> {
         match draft {
             Draft::Run(run) => all.extend(&run.slots),
             Draft::Repeat(r) => [&r.first, &r.odd, &r.even].into_iter().for_each(|d| all.extend(used(d))),
+            Draft::Tiles(t) => all.extend(used(&t.body)),
         }
     }
     all.sort_unstable();
@@ -482,7 +553,7 @@ fn copy_pass(l: &LoopOp, from: ResourceId, to: ResourceId, ops: &Ops) -> KernelP
         Shape::Table { element: pipe_graph::types::Element::F32, .. } => {
             (Entry::At, Reach::Whole, "fn at(i: i32) -> f32 { return load_source(i); }".to_owned())
         }
-        Shape::Table { .. } | Shape::Words { .. } => {
+        Shape::Table { .. } | Shape::Words { .. } | Shape::Pixels { .. } => {
             (Entry::At, Reach::Whole, "fn at(i: i32) -> u32 { return load_source(i); }".to_owned())
         }
     };
@@ -520,6 +591,55 @@ struct Writer<'a> {
     slot_of: &'a [SlotId],
     uniforms: Vec<u8>,
     bytes_moved: u64,
+    /// The launches written last, for the tiles that they belong to.
+    placed: Vec<Launched>,
+}
+
+/// A launch of a tile's body, with what differs from tile to tile.
+struct Launched {
+    pass: KernelPass,
+    places: Vec<Place>,
+    cover: Cover,
+    uniform_offset: u32,
+    /// Whether it writes images or pixels of files.
+    makes_pixels: bool,
+}
+
+impl Launched {
+    /// The part of the grid that a tile runs: pixels, blocks, or (along x alone) groups of pixels of a file.
+    fn grid(&self, windows: &Windows, tile: &Rect) -> Rect {
+        let written = self.pass.writes.iter().filter_map(|w| windows.halos.get(&w.resource));
+        let halo = written.copied().reduce(Halo::union);
+        let covered = windows.widened(tile, halo.unwrap_or_default());
+        match self.pass.grid {
+            Grid::Blocks(block) => {
+                // A block that makes pixels runs wherever the window meets it; others in the tile that they begin in.
+                let first = |n: u32, i: usize| if self.makes_pixels { n / block[i] } else { n.div_ceil(block[i]) };
+                let axis = |range: &Range<u32>, i: usize| first(range.start, i)..range.end.div_ceil(block[i]);
+                Rect { x: axis(&covered.x, 0), y: axis(&covered.y, 1) }
+            }
+            Grid::Pixels(per) => Rect { x: 0..(covered.area().div_ceil(per.into())) as u32, y: 0..1 },
+            _ => covered,
+        }
+    }
+
+    /// Writes its words of the uniform buffer for a tile, and answers its workgroups.
+    fn place(&self, windows: &Windows, tile: &Rect, uniforms: &mut Vec<(u32, i32)>) -> [u32; 3] {
+        let grid = self.grid(windows, tile);
+        let origin = |r: &Rect| [r.x.start as i32, r.y.start as i32];
+        for place in &self.places {
+            let [x, y] = match place.what {
+                Placed::GridFirst => origin(&grid),
+                Placed::GridEnd => [grid.x.end as i32, grid.y.end as i32],
+                Placed::First(id) => origin(&windows.window(id, tile).unwrap_or_else(|| tile.clone())),
+                Placed::Size(id) => windows.window(id, tile).unwrap_or_else(|| tile.clone()).size().map(|n| n as i32),
+            };
+            let at = self.uniform_offset + place.offset as u32;
+            uniforms.extend([(at, x), (at + 4, y)]);
+        }
+        let [w, h] = grid.size();
+        if w == 0 || h == 0 { [0; 3] } else { self.cover.groups_of([w, h, 1]) }
+    }
 }
 
 impl Writer<'_> {
@@ -527,12 +647,14 @@ impl Writer<'_> {
         let one = |draft| match draft {
             Draft::Run(run) => Step::Run(self.run(run)),
             Draft::Repeat(r) => Step::Repeat(self.repeat(r)),
+            Draft::Tiles(t) => Step::Tiles(self.tiles(t)),
         };
         drafts.into_iter().map(one).collect()
     }
 
     fn run(&mut self, draft: RunDraft) -> Run {
         let RunDraft { pass, composed, slots, clears } = draft;
+        let groups = composed.cover.groups;
         let uniform_offset = if composed.uniforms.is_empty() {
             0
         } else {
@@ -546,18 +668,49 @@ impl Writer<'_> {
         let writes: Vec<ResourceId> = pass.writes.iter().map(|w| w.resource).collect();
         let bytes = reads.iter().chain(&writes).map(|id| self.ops.shape(*id).bytes()).sum();
         self.bytes_moved += bytes;
+        let makes_pixels = writes.iter().any(|id| self.ops.shape(*id).plane().is_some());
+        self.placed.push(Launched { pass: pass.clone(), places: composed.places, cover: composed.cover, uniform_offset, makes_pixels });
         Run {
             name: pass.name.clone(),
             nodes: pass.nodes.iter().map(|n| self.ops.nodes[n.0 as usize].clone()).collect(),
             kernel: composed.kernel,
             slots: slots.iter().map(|v| self.slot_of[v.0]).collect(),
             uniform_offset,
-            groups: composed.groups,
+            groups,
             clears: clears.iter().map(|v| self.slot_of[v.0]).collect(),
             bytes,
             reads: reads.iter().map(name).collect(),
             writes: writes.iter().map(name).collect(),
         }
+    }
+
+    fn tiles(&mut self, t: TilesDraft) -> Tiling {
+        let before = self.bytes_moved;
+        self.placed.clear();
+        let body = self.steps(t.body);
+        let launched = std::mem::take(&mut self.placed);
+        let slot = |v: &ValueId| self.slot_of[v.0];
+        let crossing = |(brought, value): &(Brought, ValueId), tile: &Rect| {
+            let Shape::Pixels { pixel, .. } = self.ops.shape(brought.resource) else {
+                unreachable!("only pixels cross the rim tile by tile")
+            };
+            let rect = t.windows.window(brought.resource, tile).unwrap_or_else(|| tile.clone());
+            let Brought { name, plane, .. } = brought.clone();
+            Crossing { name, plane, pixel, size: t.windows.size, rect, slot: slot(value) }
+        };
+        let one = |tile: &Rect| {
+            let mut uniforms = Vec::new();
+            let groups = launched.iter().map(|l| l.place(&t.windows, tile, &mut uniforms)).collect();
+            let cross = |list: &[(Brought, ValueId)]| list.iter().map(|b| crossing(b, tile)).collect();
+            Tile { uploads: cross(&t.uploads), uniforms, groups, fetches: cross(&t.fetches) }
+        };
+        let tiles: Vec<Tile> = t.windows.tiles().iter().map(one).collect();
+        let mut names: Vec<&str> = t.fetches.iter().map(|(b, _)| b.name.as_str()).collect();
+        names.dedup();
+        let name = if names.is_empty() { launched.last().map_or_else(String::new, |l| l.pass.name.clone()) } else { names.join("+") };
+        self.bytes_moved = before + (self.bytes_moved - before) * tiles.len() as u64;
+        let clears = t.clears.iter().map(slot).collect();
+        Tiling { name, size: t.windows.size, step: t.windows.step, work: t.work, clears, body, tiles }
     }
 
     fn repeat(&mut self, r: RepeatDraft) -> Repeat {

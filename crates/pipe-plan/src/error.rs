@@ -29,13 +29,23 @@ pub enum PlanError {
         human(budget),
         human(bytes)
     )]
-    Budget { needed: u64, budget: u64, alive: usize, name: String, bytes: u64 },
+    Budget { needed: u64, budget: u64, name: String, bytes: u64 },
+    /// It does not fit, and tiles do not help.
+    #[error("{whole}\n  tiles do not help: {why}")]
+    NoTiles { whole: Box<Self>, why: String },
     /// A node refused to be lowered.
     #[error("`{name}` {message}")]
     Node { name: String, message: String },
 }
 
-fn human(bytes: &u64) -> String {
+impl PlanError {
+    /// Whether images made in parts may help.
+    pub(crate) const fn is_about_size(&self) -> bool {
+        matches!(self, Self::ImageTooLarge { .. } | Self::TableTooLarge { .. } | Self::TooManyGroups { .. } | Self::Budget { .. })
+    }
+}
+
+pub(crate) fn human(bytes: &u64) -> String {
     let (unit, name) = if *bytes < 1 << 20 { (10, "KiB") } else { (20, "MiB") };
     format!("{:.1} {name}", *bytes as f64 / f64::from(1 << unit))
 }

@@ -37,23 +37,32 @@ const MOST_REPEATED: usize = 2;
 /// Most stages of one kernel: beyond, registers run out before bandwidth does.
 const MOST_STAGES: usize = 24;
 
+/// What is spared where a value may be stored or computed again.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Thrift {
+    /// Bytes moved.
+    Bytes,
+    /// Bytes held: values computed from few pixels are never stored.
+    Memory,
+}
+
 /// Fuses every region.
-pub(crate) fn fuse(mut ops: Ops, limits: &Limits) -> (Ops, Vec<String>) {
+pub(crate) fn fuse(mut ops: Ops, limits: &Limits, thrift: Thrift) -> (Ops, Vec<String>) {
     let mut log = Vec::new();
     let wanted: BTreeSet<ResourceId> = ops.wanted().collect();
     let list = std::mem::take(&mut ops.ops);
-    let list = region(list, &ops, &wanted, limits, &mut log);
+    let list = region(list, &ops, &wanted, (limits, thrift), &mut log);
     ops.ops = list;
     (ops, log)
 }
 
-fn region(list: Vec<Op>, ops: &Ops, outside: &BTreeSet<ResourceId>, limits: &Limits, log: &mut Vec<String>) -> Vec<Op> {
+fn region(list: Vec<Op>, ops: &Ops, outside: &BTreeSet<ResourceId>, how: (&Limits, Thrift), log: &mut Vec<String>) -> Vec<Op> {
     let inner = |l: LoopOp, log: &mut Vec<String>| {
         let mut needed: BTreeSet<ResourceId> = l.states.iter().flat_map(|s| [s.next, s.carried]).collect();
         if let Count::Until { value, .. } = l.count {
             needed.insert(value);
         }
-        LoopOp { body: region(l.body, ops, &needed, limits, log), ..l }
+        LoopOp { body: region(l.body, ops, &needed, how, log), ..l }
     };
     let list: Vec<Op> = list
         .into_iter()
@@ -62,7 +71,8 @@ fn region(list: Vec<Op>, ops: &Ops, outside: &BTreeSet<ResourceId>, limits: &Lim
             pass @ Op::Pass(_) => pass,
         })
         .collect();
-    let mut fusion = Fusion { list: share_equal(list, outside, log), ops, outside, limits, log, said: BTreeSet::new() };
+    let (limits, thrift) = how;
+    let mut fusion = Fusion { list: share_equal(list, outside, log), ops, outside, limits, thrift, log, said: BTreeSet::new() };
     fusion.everywhere(Fusion::fold);
     fusion.everywhere(Fusion::fold_into_all);
     fusion.everywhere(Fusion::fold);
@@ -139,6 +149,7 @@ struct Fusion<'a> {
     ops: &'a Ops,
     outside: &'a BTreeSet<ResourceId>,
     limits: &'a Limits,
+    thrift: Thrift,
     log: &'a mut Vec<String>,
     /// What the log says.
     said: BTreeSet<String>,
@@ -211,14 +222,19 @@ impl Fusion<'_> {
     fn fold_into_all(&mut self, p: usize) -> bool {
         let Some(producer) = self.pass(p) else { return false };
         let Some(result) = foldable(producer, self.ops) else { return false };
-        if self.outside.contains(&result) || producer.stages.len() > MOST_REPEATED {
+        let (most_stages, most_copies) = match self.thrift {
+            Thrift::Bytes => (MOST_REPEATED, MOST_COPIES),
+            Thrift::Memory => (MOST_STAGES / 2, u64::MAX),
+        };
+        if self.outside.contains(&result) || producer.stages.len() > most_stages {
             return false;
         }
         let readers = self.readers(p, result);
         let copies = readers.len() as u64;
         let read: u64 = producer.reads.iter().map(|r| self.ops.shape(*r).bytes()).sum();
         let stored = self.ops.shape(result).bytes();
-        if !(2..=MOST_COPIES).contains(&copies) || copies * read > read + stored + copies * stored {
+        let moves_more = self.thrift == Thrift::Bytes && copies * read > read + stored + copies * stored;
+        if !(2..=most_copies).contains(&copies) || moves_more {
             return false;
         }
         let fused = |c: &usize| {

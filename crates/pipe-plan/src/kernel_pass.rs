@@ -10,6 +10,8 @@ use pipe_graph::pass::{
     State, Value,
 };
 
+use crate::window::Windows;
+
 /// Where a port's values come from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub(crate) enum Source {
@@ -125,6 +127,14 @@ impl KernelPass {
         self.stages.last().expect("a pass has a stage")
     }
 
+    /// Width and height of the pixels that it works on: of the first image (or pixels of a file) that it writes, or else
+    /// of the one that it reads once.
+    pub(crate) fn plane(&self, ops: &Ops) -> Option<[u32; 2]> {
+        let written = self.writes.iter().find_map(|w| ops.shape(w.resource).plane());
+        let once = || self.stages.iter().flat_map(|s| &s.ports).filter(|p| p.once).find_map(|p| p.shape.plane());
+        written.or_else(once)
+    }
+
     /// Scalars that drive parameters.
     pub(crate) fn drivers(&self) -> impl Iterator<Item = ResourceId> + '_ {
         self.stages.iter().flat_map(|s| s.params.values()).filter_map(|v| match v {
@@ -183,6 +193,47 @@ impl Op {
         match self {
             Self::Pass(pass) => pass.writes.iter().map(|w| w.resource).collect(),
             Self::Loop(l) => l.states.iter().map(|s| s.result).collect(),
+        }
+    }
+}
+
+/// Images that are made tile by tile: the body runs for each tile.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct TilingOp {
+    /// What runs, over resources of the tiling's own where only a window is held.
+    pub(crate) body: Vec<Op>,
+    pub(crate) windows: Windows,
+    /// Pixels of files that the host brings for each tile.
+    pub(crate) uploads: Vec<Brought>,
+    /// Pixels that the host takes after each tile.
+    pub(crate) fetches: Vec<Brought>,
+    /// Pixels that are computed for each that is wanted.
+    pub(crate) work: f32,
+}
+
+/// One plane of a picture that crosses the rim tile by tile.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Brought {
+    /// The external, or the fetch.
+    pub(crate) name: String,
+    pub(crate) plane: u32,
+    pub(crate) resource: ResourceId,
+}
+
+/// A part of a schedule.
+#[derive(Debug, Clone)]
+pub(crate) enum Portion {
+    /// Over whole images.
+    Whole(Vec<Op>),
+    /// Tile by tile.
+    Tiles(TilingOp),
+}
+
+impl Portion {
+    pub(crate) fn ops(&self) -> &[Op] {
+        match self {
+            Self::Whole(ops) => ops,
+            Self::Tiles(tiling) => &tiling.body,
         }
     }
 }

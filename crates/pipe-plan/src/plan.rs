@@ -177,6 +177,104 @@ impl Times {
     }
 }
 
+/// A rectangle of pixels.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct Rect {
+    /// Columns.
+    pub x: Range<u32>,
+    /// Rows.
+    pub y: Range<u32>,
+}
+
+impl Rect {
+    /// Width and height.
+    pub const fn size(&self) -> [u32; 2] {
+        [self.x.end - self.x.start, self.y.end - self.y.start]
+    }
+
+    /// Number of pixels.
+    pub const fn area(&self) -> u64 {
+        let [w, h] = self.size();
+        w as u64 * h as u64
+    }
+}
+
+/// Images that are made tile by tile, since they do not fit whole. The same steps run for every tile, row by row of tiles,
+/// in the same slots; what the tiles leave in tables and in whole images lies in slots of its own.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Tiling {
+    /// For messages: the names of what it makes.
+    pub name: String,
+    /// Width and height of the images.
+    pub size: [u32; 2],
+    /// Width and height of a tile that no edge cuts.
+    pub step: [u32; 2],
+    /// Pixels that are computed for each that is wanted: above 1 where tiles overlap.
+    pub work: f32,
+    /// Slots that are filled with zeros before the first tile.
+    pub clears: Vec<SlotId>,
+    /// What runs for a tile.
+    pub body: Vec<Step>,
+    /// The tiles.
+    pub tiles: Vec<Tile>,
+}
+
+impl Tiling {
+    /// How many tiles there are across and down.
+    pub const fn layout(&self) -> [u32; 2] {
+        [self.size[0].div_ceil(self.step[0]), self.size[1].div_ceil(self.step[1])]
+    }
+}
+
+/// What differs from tile to tile.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Tile {
+    /// Pixels that the host brings before.
+    pub uploads: Vec<Crossing>,
+    /// Words of the uniform buffer, by their byte offset.
+    pub uniforms: Vec<(u32, i32)>,
+    /// Workgroups of the launches of the body, in their order (those of a loop's three parts one after the other).
+    pub groups: Vec<[u32; 3]>,
+    /// Pixels that the host takes afterwards.
+    pub fetches: Vec<Crossing>,
+}
+
+/// A rectangle of a picture between host and device. In its slot the pixels lie row after row, without padding.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Crossing {
+    /// The external, or the fetch.
+    pub name: String,
+    /// Which plane of the picture, where each channel has one; 0 otherwise.
+    pub plane: u32,
+    /// Bytes of one pixel of the plane.
+    pub pixel: u32,
+    /// Width and height of the picture.
+    pub size: [u32; 2],
+    /// Which pixels.
+    pub rect: Rect,
+    /// Where they lie on the device.
+    pub slot: SlotId,
+}
+
+impl Crossing {
+    /// Bytes of the rectangle.
+    pub const fn bytes(&self) -> u64 {
+        self.rect.area() * self.pixel as u64
+    }
+
+    /// Where the rectangle's rows lie in memory that holds, of each plane, the rows from `held.start` to `held.end`.
+    pub fn ranges(&self, held: &Range<u32>) -> Vec<Range<u64>> {
+        let (width, pixel) = (u64::from(self.size[0]), u64::from(self.pixel));
+        let plane = u64::from(self.plane) * width * u64::from(held.end - held.start) * pixel;
+        let [w, h] = self.rect.size().map(u64::from);
+        let first = plane + (u64::from(self.rect.y.start - held.start) * width + u64::from(self.rect.x.start)) * pixel;
+        if w == width {
+            return vec![first..first + w * h * pixel];
+        }
+        (0..h).map(|y| first + y * width * pixel..first + (y * width + w) * pixel).collect()
+    }
+}
+
 /// One thing that happens.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Step {
@@ -184,6 +282,8 @@ pub enum Step {
     Run(Run),
     /// A loop.
     Repeat(Repeat),
+    /// Tiles. Never inside another step.
+    Tiles(Tiling),
 }
 
 /// Bytes of an external that the host writes into a slot before the first step.

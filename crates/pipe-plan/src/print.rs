@@ -7,12 +7,35 @@ use pipe_graph::types::{ImageType, Precision, VolumeType};
 use serde_json::{Value, json};
 
 use crate::kernel_pass::{Op, Ops};
-use crate::plan::{Plan, Repeat, Run, Step, Storage, Times};
+use crate::plan::{Plan, Repeat, Run, Step, Storage, Tiling, Times};
 
-/// One launch with the loops around it.
+/// One launch with what runs it again and again.
 struct Line<'p> {
     run: &'p Run,
-    loops: Vec<&'p Repeat>,
+    around: Vec<Around<'p>>,
+}
+
+/// What runs a launch again and again.
+#[derive(Clone, Copy)]
+enum Around<'p> {
+    Loop(&'p Repeat),
+    Tiles(&'p Tiling),
+}
+
+impl Around<'_> {
+    fn name(&self) -> &str {
+        match self {
+            Self::Loop(r) => &r.name,
+            Self::Tiles(t) => &t.name,
+        }
+    }
+
+    fn times(&self) -> String {
+        match self {
+            Self::Loop(r) => describe(&r.count),
+            Self::Tiles(t) => format!("{} tiles of {}x{}", t.tiles.len(), t.step[0], t.step[1]),
+        }
+    }
 }
 
 impl Storage {
@@ -40,22 +63,35 @@ impl Storage {
 
 impl Plan {
     fn lines(&self) -> Vec<Line<'_>> {
-        fn walk<'p>(steps: &'p [Step], loops: &mut Vec<&'p Repeat>, lines: &mut Vec<Line<'p>>) {
+        fn walk<'p>(steps: &'p [Step], around: &mut Vec<Around<'p>>, lines: &mut Vec<Line<'p>>) {
             for step in steps {
-                match step {
-                    Step::Run(run) => lines.push(Line { run, loops: loops.clone() }),
-                    Step::Repeat(r) => {
-                        loops.push(r);
-                        // The other two copies of the body do the same over other slots.
-                        walk(&r.first, loops, lines);
-                        loops.pop();
+                let (outer, body) = match step {
+                    Step::Run(run) => {
+                        lines.push(Line { run, around: around.clone() });
+                        continue;
                     }
-                }
+                    // The other two copies of the body do the same over other slots.
+                    Step::Repeat(r) => (Around::Loop(r), &r.first),
+                    Step::Tiles(t) => (Around::Tiles(t), &t.body),
+                };
+                around.push(outer);
+                walk(body, around, lines);
+                around.pop();
             }
         }
         let mut lines = Vec::new();
         walk(&self.steps, &mut Vec::new(), &mut lines);
         lines
+    }
+
+    /// The tiling at a position of the steps.
+    pub fn tilings_at(&self, step: usize) -> Option<&Tiling> {
+        self.steps.get(step).and_then(|step| if let Step::Tiles(t) = step { Some(t) } else { None })
+    }
+
+    /// What is made tile by tile.
+    pub fn tilings(&self) -> impl Iterator<Item = &Tiling> {
+        self.steps.iter().filter_map(|step| if let Step::Tiles(t) = step { Some(t) } else { None })
     }
 
     /// The number of launches, each loop's body counted once.
@@ -74,8 +110,8 @@ impl Plan {
         let mut out = format!("plan of {}\n\npasses\n", self.name);
         for (i, line) in self.lines().iter().enumerate() {
             let run = line.run;
-            let indent = "  ".repeat(line.loops.len());
-            let times: String = line.loops.last().map(|r| format!("  [{}: {}]", r.name, describe(&r.count))).unwrap_or_default();
+            let indent = "  ".repeat(line.around.len());
+            let times: String = line.around.last().map(|a| format!("  [{}: {}]", a.name(), a.times())).unwrap_or_default();
             let _ = writeln!(
                 out,
                 "{:>4}  {indent}{}  ({})  {} -> {}  slots {}  groups {}x{}x{}  {}{times}",
@@ -89,6 +125,17 @@ impl Plan {
                 run.groups[1],
                 run.groups[2],
                 bytes(run.bytes),
+            );
+        }
+        if self.tilings().next().is_some() {
+            out.push_str("\ntiles\n");
+        }
+        for t in self.tilings() {
+            let [columns, rows] = t.layout();
+            let _ = writeln!(
+                out,
+                "      {}: {}x{} in {columns}x{rows} tiles of {}x{}, {:.2} pixels computed for each",
+                t.name, t.size[0], t.size[1], t.step[0], t.step[1], t.work
             );
         }
         out.push_str("\nslots\n");
@@ -118,18 +165,21 @@ impl Plan {
                 "slot": run.slots.iter().map(|s| s.0).collect::<Vec<_>>(),
                 "grid": run.groups,
             });
-            if let (Some(r), Some(object)) = (line.loops.last(), pass.as_object_mut()) {
-                object.insert("loop".into(), json!(r.name));
-                object.insert("times".into(), json!(describe(&r.count)));
+            if let (Some(a), Some(object)) = (line.around.last(), pass.as_object_mut()) {
+                let key = if matches!(a, Around::Loop(_)) { "loop" } else { "tiles" };
+                object.insert(key.into(), json!(a.name()));
+                object.insert("times".into(), json!(a.times()));
             }
             pass
         };
         let slot = |(id, s): (usize, &crate::plan::Slot)| json!({"id": id, "format": s.storage.format(), "size": s.storage.extent(), "bytes": s.storage.bytes()});
+        let tiling = |t: &Tiling| json!({"name": t.name, "size": t.size, "tile": t.step, "layout": t.layout(), "work": t.work});
         json!({
             "graph": self.name,
             "size": self.size(),
             "passes": self.lines().iter().map(pass).collect::<Vec<_>>(),
             "slots": self.slots.iter().enumerate().map(slot).collect::<Vec<_>>(),
+            "tilings": self.tilings().map(tiling).collect::<Vec<_>>(),
             "peak_bytes": self.peak_bytes,
             "naive_bytes": self.naive_bytes,
             "bytes_moved": self.bytes_moved,

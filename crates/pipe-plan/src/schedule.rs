@@ -10,7 +10,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use pipe_graph::pass::{Origin, ResourceId};
 
-use crate::kernel_pass::{LoopOp, Op, Ops};
+use crate::kernel_pass::{LoopOp, Op, Ops, Portion};
 
 /// Most sets that the exact search looks at in a region of 20 operations; fewer in larger ones.
 const MOST_SETS: usize = 4096;
@@ -20,7 +20,9 @@ const MOST_SETS: usize = 4096;
 /// **Invariant**: every operation stands after those whose results it reads.
 #[derive(Debug, Clone)]
 pub(crate) struct Schedule {
+    /// Resources, names, and what must be there at the end; the operations themselves are in `portions`.
     pub(crate) ops: Ops,
+    pub(crate) portions: Vec<Portion>,
 }
 
 /// Orders every region.
@@ -28,8 +30,7 @@ pub(crate) fn schedule(mut ops: Ops) -> Schedule {
     let wanted: BTreeSet<ResourceId> = ops.wanted().collect();
     let list = std::mem::take(&mut ops.ops);
     let ordered = region(list, &ops, &wanted);
-    ops.ops = ordered;
-    Schedule { ops }
+    Schedule { ops, portions: vec![Portion::Whole(ordered)] }
 }
 
 fn region(list: Vec<Op>, ops: &Ops, outside: &BTreeSet<ResourceId>) -> Vec<Op> {

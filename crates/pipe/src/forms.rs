@@ -3,7 +3,7 @@
 use pipe_graph::rim::{Alpha, Layout, PixelForm, Sample, Transfer, Voxel, VoxelForm};
 use pipe_graph::types::{Precision, VolumeType};
 use pipe_io::volume::VolumeHeader;
-use pipe_io::{Channels, Colour, Form, Picture};
+use pipe_io::{Channels, Colour, Form, Header, Picture};
 
 fn sample(s: pipe_io::Sample) -> Sample {
     match s {
@@ -49,15 +49,18 @@ pub(crate) const fn count(c: Channels) -> u8 {
 
 /// How a decoded picture lies in memory.
 pub(crate) fn of_picture(p: &Picture) -> PixelForm {
-    PixelForm {
-        size: [p.width, p.height],
-        channels: count(p.channels),
-        sample: sample(p.sample),
-        layout: layout(p.layout),
-        alpha: alpha(p.alpha),
-        transfer: transfer(&p.colour),
-        matrix: clean(p.colour.to_working_matrix()),
-    }
+    let form = Form { sample: p.sample, layout: p.layout, channels: p.channels, alpha: p.alpha, colour: p.colour };
+    of_input(&form, [p.width, p.height])
+}
+
+/// How a picture of this header lies in memory once it is decoded.
+pub(crate) fn of_header(h: &Header, layout: pipe_io::Layout) -> PixelForm {
+    let form = Form { sample: h.sample, layout, channels: h.channels, alpha: h.alpha, colour: h.colour };
+    of_input(&form, [h.width, h.height])
+}
+
+fn of_input(f: &Form, size: [u32; 2]) -> PixelForm {
+    PixelForm { matrix: clean(f.colour.to_working_matrix()), ..of_form(f, size) }
 }
 
 /// How a writer wants its pixels.

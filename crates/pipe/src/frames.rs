@@ -157,9 +157,9 @@ pub fn run_sequence(
             }
             let ran = read.and_then(|(mut job, inputs)| match inputs {
                 None => Ok(None),
-                Some(inputs) => {
+                Some(mut inputs) => {
                     job.frames_before = before;
-                    session.execute(&job, &inputs, Some(cancel), None).map(Some)
+                    session.execute(&job, &mut inputs, Some(cancel), None).map(Some)
                 }
             });
             match ran {

@@ -16,6 +16,7 @@
 //! ```
 
 pub mod compare;
+mod exchange;
 mod failure;
 mod forms;
 pub mod frames;

@@ -11,7 +11,7 @@ use std::sync::atomic::AtomicBool;
 use std::time::{Duration, Instant};
 
 use indexmap::IndexMap;
-use pipe_gpu::{Choice, Device, Executor, Prepared, RunOptions};
+use pipe_gpu::{Choice, Device, Executor, Outputs, Prepared, RunOptions};
 use pipe_graph::graph::{Graph, Instance, Work};
 use pipe_graph::node::{FileSource, ReadbackFile};
 use pipe_graph::pass::Limits;
@@ -20,10 +20,11 @@ use pipe_graph::types::{EdgeKind, EdgeType, Element, ImageType, VolumeType};
 use pipe_io::mesh::Mesh;
 use pipe_io::table::Table;
 use pipe_io::volume::{Volume, VolumeHeader, Voxel};
-use pipe_io::{Animation, Channels, Metadata, Picture, ReadOptions, Source, Target, WriteOptions};
-use pipe_plan::lower::{Rim, file_name, lower, readback_name};
+use pipe_io::{Animation, Channels, Header, Metadata, Picture, ReadOptions, RowReader, RowWriter, Source, Target, WriteOptions};
+use pipe_plan::lower::{Rim, file_name, readback_name};
 use pipe_plan::{Options, Plan};
 
+use crate::exchange::Pictures;
 use crate::project::{Project, World};
 use crate::{Failure, forms, readback};
 
@@ -166,6 +167,8 @@ impl Report {
 pub enum Decoded {
     /// An image.
     Picture(Picture),
+    /// An image so large that its rows are better decoded when they are needed.
+    Distant(RowReader),
     /// A volume.
     Volume(Volume),
     /// A table.
@@ -173,9 +176,23 @@ pub enum Decoded {
 }
 
 impl Decoded {
+    /// Decodes a picture of which only the header was read.
+    fn bring(&mut self) -> Result<(), Failure> {
+        if let Self::Distant(reader) = self {
+            let (w, h) = (reader.header().width, reader.header().height);
+            let mut bytes = Vec::new();
+            reader.read(0..h, &mut bytes)?;
+            let Header { sample, channels, alpha, colour, metadata, .. } = reader.header().clone();
+            let layout = reader.layout();
+            *self = Self::Picture(Picture { width: w, height: h, sample, layout, channels, alpha, colour, bytes, metadata });
+        }
+        Ok(())
+    }
+
     fn bytes(&self) -> Cow<'_, [u8]> {
         match self {
             Self::Picture(p) => Cow::Borrowed(&p.bytes),
+            Self::Distant(_) => Cow::Borrowed(&[]),
             Self::Volume(v) => Cow::Borrowed(&v.bytes),
             Self::Table(Table::Float(v)) => v.iter().flat_map(|v| v.to_le_bytes()).collect(),
             Self::Table(Table::Uint(v)) => v.iter().flat_map(|v| v.to_le_bytes()).collect(),
@@ -185,6 +202,10 @@ impl Decoded {
     fn ty(&self) -> EdgeType {
         match self {
             Self::Picture(p) => EdgeType::Image(ImageType::new([p.width, p.height], forms::image_channels(p.channels))),
+            Self::Distant(r) => {
+                let header = r.header();
+                EdgeType::Image(ImageType::new([header.width, header.height], forms::image_channels(header.channels)))
+            }
             Self::Volume(v) => EdgeType::Volume(forms::volume_type(&v.header)),
             Self::Table(Table::Float(v)) => EdgeType::table(v.len() as u32, Element::F32),
             Self::Table(Table::Uint(v)) => EdgeType::table(v.len() as u32, Element::U32),
@@ -195,6 +216,25 @@ impl Decoded {
 /// All inputs of one frame, by graph input and by [`file_name`] of files that nodes read.
 pub type Inputs = IndexMap<String, Decoded>;
 
+/// Bytes of pixels from which on a picture is read row by row, if its plan allows: a picture of this size costs more time
+/// to decode than opening a device takes.
+const LARGE: u64 = 1 << 30;
+
+/// A picture, or only its header where it is large.
+fn picture(file: &str, job: &Job) -> Result<Decoded, Failure> {
+    let source = Source::parse(file);
+    // A stream can be read once only, and is held anyway.
+    if source.path.is_some() {
+        let header = pipe_io::probe(&source, &job.read);
+        let bytes = |h: &Header| u64::from(h.width) * u64::from(h.height) * h.channels.count() as u64 * h.sample.bytes() as u64;
+        let large = |bytes: u64| bytes >= LARGE || job.budget.is_some_and(|budget| bytes >= budget / 4);
+        if header.as_ref().map_or(true, |h| large(bytes(h))) {
+            return Ok(Decoded::Distant(RowReader::open(&source, &job.read)?));
+        }
+    }
+    Ok(Decoded::Picture(pipe_io::read(&source, &job.read)?))
+}
+
 /// Reads every input file of a job.
 pub fn decode(job: &Job, kinds: &HashMap<String, EdgeKind>) -> Result<Inputs, Failure> {
     let mut inputs = Inputs::new();
@@ -202,7 +242,7 @@ pub fn decode(job: &Job, kinds: &HashMap<String, EdgeKind>) -> Result<Inputs, Fa
         let value = match kinds.get(name) {
             Some(EdgeKind::Table) => Decoded::Table(pipe_io::table::read(Path::new(file))?),
             Some(EdgeKind::Volume) => Decoded::Volume(pipe_io::volume::read(&Source::parse(file), &job.read.limits)?),
-            _ => Decoded::Picture(pipe_io::read(&Source::parse(file), &job.read)?),
+            _ => picture(file, job)?,
         };
         inputs.insert(name.clone(), value);
     }
@@ -212,6 +252,8 @@ pub fn decode(job: &Job, kinds: &HashMap<String, EdgeKind>) -> Result<Inputs, Fa
 /// What comes out of a run before it is written.
 pub struct Finished {
     images: Vec<(Target, Picture)>,
+    /// Files that all rows were written to, and that appear at the end.
+    written: Vec<RowWriter>,
     volumes: Vec<(PathBuf, Volume)>,
     meshes: Vec<(PathBuf, Mesh)>,
     data: Vec<(ReadbackFile, Vec<u8>)>,
@@ -236,6 +278,9 @@ impl Finished {
             }
             let options = WriteOptions { channels: Some(picture.channels), ..self.write.clone() };
             pipe_io::write(target, picture, &options)?;
+        }
+        for writer in self.written {
+            writer.finish()?;
         }
         for (path, volume) in &self.volumes {
             pipe_io::volume::write(path, volume)?;
@@ -283,9 +328,9 @@ impl Session {
     pub fn run(&mut self, job: &Job) -> Result<Report, Failure> {
         let started = Instant::now();
         let kinds = input_kinds(&mut Project::open(&job.graph)?);
-        let inputs = decode(job, &kinds)?;
+        let mut inputs = decode(job, &kinds)?;
         let decoded = millis(started);
-        let mut finished = self.execute(job, &inputs, None, None)?;
+        let mut finished = self.execute(job, &mut inputs, None, None)?;
         finished.report.wall.decode = decoded;
         finished.report.wall.total += decoded;
         finished.write()
@@ -295,7 +340,7 @@ impl Session {
     pub fn execute(
         &mut self,
         job: &Job,
-        inputs: &Inputs,
+        inputs: &mut Inputs,
         cancel: Option<&AtomicBool>,
         progress: Option<&(dyn Fn(u32, u32) + Sync)>,
     ) -> Result<Finished, Failure> {
@@ -304,17 +349,20 @@ impl Session {
         let world = World { read: job.read };
         let request = request(job, inputs);
         let Some(graph) = project.resolve(&request, &world) else { return Err(project.failure(false)) };
-        let files = read_files(&graph, job)?;
+        let mut files = read_files(&graph, job)?;
         let (rim, outputs) = rim(job, &graph, inputs, &files)?;
         let plan = Arc::new(make_plan(&graph, &rim, &self.limits(), job)?);
+        // What is needed whole is decoded whole.
+        for (name, decoded) in inputs.iter_mut().chain(&mut files) {
+            if plan.uploads.iter().any(|upload| upload.name == *name) {
+                decoded.bring()?;
+            }
+        }
         self.prepare(&plan)?;
         let planned = millis(started);
 
-        let held: HashMap<&str, Cow<'_, [u8]>> = inputs.iter().chain(&files).map(|(n, d)| (n.as_str(), d.bytes())).collect();
-        let given: HashMap<&str, &[u8]> = held.iter().map(|(n, b)| (*n, b.as_ref())).collect();
         let options = RunOptions { timeout: job.timeout, profile: job.profile, cancel, progress };
-        let prepared = self.prepared.as_ref().expect("prepared above");
-        let mut ran = self.executor.run(prepared, &given, &options)?;
+        let (mut ran, mut files_of) = self.launch(job, &plan, &outputs, [inputs, &mut files], &options)?;
 
         let mut report = Report {
             device: self.device_name().to_owned(),
@@ -340,8 +388,12 @@ impl Session {
                 data.push((file, bytes));
             }
         }
-        let (mut images, mut volumes, mut meshes) = (Vec::new(), Vec::new(), Vec::new());
+        let (mut images, mut volumes, mut meshes, mut written) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
         for output in outputs {
+            if let Some(file) = files_of.remove(&output.name) {
+                written.push(file);
+                continue;
+            }
             if let Packed::Mesh(path) = output.to {
                 let mut part = |part: &str| ran.fetched.shift_remove(&format!("{}.{part}", output.name)).unwrap_or_default();
                 let mesh = readback::mesh(&output.name, &part("vertices"), &part("triangles"), &part("counts"))?;
@@ -361,7 +413,44 @@ impl Session {
                 Packed::Data(file) => data.push((file, bytes)),
             }
         }
-        Ok(Finished { images, volumes, meshes, data, report, write: job.write.clone() })
+        Ok(Finished { images, written, volumes, meshes, data, report, write: job.write.clone() })
+    }
+
+    /// Runs the prepared plan. Outputs that are made tile by tile go straight into their files.
+    fn launch(
+        &mut self,
+        job: &Job,
+        plan: &Plan,
+        outputs: &[Output],
+        [inputs, files]: [&mut Inputs; 2],
+        options: &RunOptions<'_>,
+    ) -> Result<(Outputs, HashMap<String, RowWriter>), Failure> {
+        let prepared = self.prepared.as_ref().expect("a plan is prepared before it runs");
+        if plan.tilings().next().is_none() {
+            let held: HashMap<&str, Cow<'_, [u8]>> = inputs.iter().chain(&*files).map(|(n, d)| (n.as_str(), d.bytes())).collect();
+            let given: HashMap<&str, &[u8]> = held.iter().map(|(n, b)| (*n, b.as_ref())).collect();
+            return Ok((self.executor.run(prepared, &given, options)?, HashMap::new()));
+        }
+        let needed = |name: &str| plan.uploads.iter().any(|u| u.name == name);
+        let held: HashMap<String, Vec<u8>> =
+            inputs.iter().chain(&*files).filter(|(n, _)| needed(n)).map(|(n, d)| (n.clone(), d.bytes().into_owned())).collect();
+        let given: HashMap<&str, &[u8]> = held.iter().map(|(n, b)| (n.as_str(), b.as_slice())).collect();
+        let mut pictures = Pictures::of([inputs, files].into_iter());
+        for fetch in plan.tilings().flat_map(|t| t.tiles.first()).flat_map(|t| &t.fetches) {
+            let image = outputs.iter().find(|o| o.name == fetch.name).and_then(|o| match &o.to {
+                Packed::Image { target, form, size } if !target.format.moves() => Some((target, form, size, &o.metadata)),
+                _ => None,
+            });
+            let file = image.filter(|_| fetch.plane == 0).map(|(target, form, [w, h], metadata)| {
+                let picture = form.picture(*w, *h, Vec::new(), metadata.clone().unwrap_or_default());
+                RowWriter::create(target, &picture, &WriteOptions { channels: Some(picture.channels), ..job.write.clone() })
+            });
+            pictures.collect(&fetch.name, file.transpose()?);
+        }
+        let mut ran = self.executor.run_through(prepared, &given, &mut pictures, options)?;
+        let arrived = pictures.arrived();
+        ran.fetched.extend(arrived.bytes);
+        Ok((ran, arrived.files))
     }
 
     fn prepare(&mut self, plan: &Arc<Plan>) -> Result<(), Failure> {
@@ -418,7 +507,7 @@ fn read_files(graph: &Graph, job: &Job) -> Result<Inputs, Failure> {
                         continue;
                     }
                     let decoded = match &source {
-                        FileSource::Image(path) => Decoded::Picture(pipe_io::read(&Source::parse(path), &job.read)?),
+                        FileSource::Image(path) => picture(path, job)?,
                         FileSource::Volume(path) => Decoded::Volume(pipe_io::volume::read(&Source::parse(path), &job.read.limits)?),
                     };
                     files.insert(name, decoded);
@@ -451,12 +540,17 @@ fn rim(job: &Job, graph: &Graph, inputs: &Inputs, files: &Inputs) -> Result<(Rim
     for (name, value) in inputs.iter().chain(files) {
         match value {
             Decoded::Picture(p) => drop(rim.inputs.insert(name.clone(), forms::of_picture(p))),
+            Decoded::Distant(r) => drop(rim.inputs.insert(name.clone(), forms::of_header(r.header(), r.layout()))),
             Decoded::Volume(v) => drop(rim.volumes.insert(name.clone(), forms::of_volume(&v.header))),
             Decoded::Table(_) => {}
         }
     }
     let all_inputs = || inputs.values().chain(files.values());
-    let first = all_inputs().find_map(|d| if let Decoded::Picture(p) = d { Some(&p.metadata) } else { None });
+    let first = all_inputs().find_map(|d| match d {
+        Decoded::Picture(p) => Some(&p.metadata),
+        Decoded::Distant(r) => Some(&r.header().metadata),
+        _ => None,
+    });
     let first_volume = all_inputs().find_map(|d| if let Decoded::Volume(v) = d { Some(&v.header) } else { None });
     let mut outputs = Vec::new();
     let named = graph.outputs().map(|(n, v)| (n.to_owned(), v));
@@ -561,12 +655,11 @@ fn first_size(graph: &Graph) -> Vec<u32> {
 
 /// Lowers and plans.
 pub fn make_plan(graph: &Graph, rim: &Rim, limits: &Limits, job: &Job) -> Result<Plan, Failure> {
-    let mut passes = lower(graph, rim, limits)?;
     // An output that no file is bound to is not computed.
-    passes.fetches.retain(|f| {
+    let wanted = |fetch: &str| {
         // Of a mesh three parts are fetched, `NAME.vertices` and so on.
-        let name = f.name.split_once('.').map_or(f.name.as_str(), |(name, _)| name);
+        let name = fetch.split_once('.').map_or(fetch, |(name, _)| name);
         job.outputs.contains_key(name) || !graph.outputs().any(|(n, _)| n == name)
-    });
-    Ok(pipe_plan::plan(&graph.name, passes, limits, &Options { fuse: job.fuse, budget: job.budget })?)
+    };
+    Ok(pipe_plan::plan_graph(graph, rim, limits, &Options { fuse: job.fuse, budget: job.budget, tile: None }, &wanted)?)
 }

@@ -123,7 +123,7 @@ pub(crate) fn with(step: Step, change: impl FnOnce(&mut Run)) -> Step {
             change(&mut run);
             Step::Run(run)
         }
-        Step::Repeat(_) => panic!("not a launch"),
+        Step::Repeat(_) | Step::Tiles(_) => panic!("not a launch"),
     }
 }
 

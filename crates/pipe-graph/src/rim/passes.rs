@@ -7,7 +7,7 @@ use std::ops::Range;
 
 use super::{Alpha, Layout, PixelForm, Sample, Transfer, Voxel, VoxelForm};
 use crate::lowering::{Lowering, PassBuilder};
-use crate::pass::{Access, Entry, Fetch, Grid, Origin, Reach, Resource, ResourceId, Shader, Shape};
+use crate::pass::{Access, Entry, Fetch, Grid, Limits, Origin, Reach, Resource, ResourceId, Shader, Shape};
 use crate::types::{ImageType, Precision, VolumeType};
 
 macro_rules! shader {
@@ -26,9 +26,19 @@ struct Band {
     planes: Vec<Range<u64>>,
 }
 
-/// Bands of at most `most` bytes a plane. Bands begin at multiples of 4 rows, so that they begin at whole words.
-fn bands(form: &PixelForm, most: u64) -> Vec<Band> {
+impl Band {
+    /// What each of its planes takes.
+    fn shape(&self, form: &PixelForm) -> Shape {
+        let samples = if form.layout == Layout::Planar { 1 } else { u32::from(form.channels) };
+        Shape::Pixels { size: [form.size[0], self.rows.end - self.rows.start], pixel: samples * form.sample.bytes() as u32 }
+    }
+}
+
+/// Bands of at most as many bytes a plane as a shader can bind; one where the planner cuts tiles. They begin at multiples
+/// of 4 rows, so that they begin at whole words.
+fn bands(form: &PixelForm, limits: &Limits) -> Vec<Band> {
     let [w, h] = form.size.map(u64::from);
+    let most = if limits.tiled { u64::MAX } else { limits.max_binding_bytes };
     let planes = if form.layout == Layout::Planar { u64::from(form.channels) } else { 1 };
     let row = form.bytes() / h / planes;
     let rows = (most / row.max(1) / 4 * 4).clamp(4, h.max(4));
@@ -66,7 +76,6 @@ fn describe<'b, 'a>(pass: PassBuilder<'b, 'a>, form: &PixelForm) -> PassBuilder<
         .constant("HAS_ALPHA", form.alpha != Alpha::None && matches!(form.channels, 2 | 4))
         .constant("CONVERT", convert)
         .constant("PLANAR", form.layout == Layout::Planar)
-        .constant("WIDTH", form.size[0] as i32)
         .param("gamma", gamma);
     for (name, row) in ["row0", "row1", "row2"].into_iter().zip(form.matrix) {
         pass = pass.param(name, row);
@@ -84,14 +93,14 @@ fn word_function(planes: usize) -> String {
 /// space it keeps every bit of a float file.
 pub fn ingest_image(cx: &mut Lowering<'_>, name: &str, form: &PixelForm) -> ResourceId {
     let shape = Shape::Image(ImageType::new(form.size, form.image_channels()));
-    let bands = bands(form, cx.limits().max_binding_bytes);
+    let bands = bands(form, cx.limits());
     let whole = bands.len() == 1;
     let mut image = None;
     for band in bands {
         let mut ports = Vec::new();
         for range in &band.planes {
             let origin = Origin::External { name: name.to_owned(), ranges: vec![range.clone()] };
-            ports.push(cx.graph.add(Resource { name: format!("{name}.file"), shape: words(range), origin }));
+            ports.push(cx.graph.add(Resource { name: format!("{name}.file"), shape: band.shape(form), origin }));
         }
         let out = cx.graph.add(Resource { name: name.to_owned(), shape, origin: Origin::Pass });
         let tail = if whole {
@@ -102,7 +111,7 @@ pub fn ingest_image(cx: &mut Lowering<'_>, name: &str, form: &PixelForm) -> Reso
         let pass = cx.pass("decode", shader!("io/ingest", format!("{}{tail}\n", word_function(ports.len()))));
         let mut pass = describe(pass, form).constant("FIRST_ROW", band.rows.start as i32);
         for (c, port) in ports.into_iter().enumerate() {
-            pass = pass.read(&format!("c{c}"), port, Reach::Whole);
+            pass = pass.read(&format!("c{c}"), port, Reach::Point);
         }
         let pass = if whole {
             pass.entry(Entry::Point).write("out", out)
@@ -119,19 +128,16 @@ pub fn ingest_image(cx: &mut Lowering<'_>, name: &str, form: &PixelForm) -> Reso
 /// Fetches an image as pixels of this form under `name`.
 pub fn fetch_image(cx: &mut Lowering<'_>, name: &str, image: ResourceId, form: &PixelForm) {
     let mut parts = Vec::new();
-    for band in bands(form, cx.limits().max_binding_bytes) {
-        let rows = band.rows.end - band.rows.start;
-        let outs: Vec<ResourceId> = band.planes.iter().map(|range| cx.intermediate("file", words(range))).collect();
+    for band in bands(form, cx.limits()) {
+        let outs: Vec<ResourceId> = band.planes.iter().map(|_| cx.intermediate("file", band.shape(form))).collect();
         let cases: String = (1..outs.len()).map(|c| format!("    if c == {c} {{ store_c{c}(i, v); return; }}\n")).collect();
         let put = format!("fn put(c: i32, i: i32, v: u32) {{\n{cases}    store_c0(i, v);\n}}\n");
         let grey = (form.channels == 1 || form.alpha != Alpha::None && form.channels == 2) && cx.image_of(image).channels == 4;
-        let groups = (u64::from(form.size[0]) * u64::from(rows)).div_ceil(4 / form.sample.bytes());
         let pass = cx.pass("encode", shader!("io/pack", put)).entry(Entry::Each);
         let mut pass = describe(pass, form)
             .constant("FIRST_ROW", band.rows.start as i32)
-            .constant("ROWS", rows as i32)
             .constant("GREY", grey)
-            .grid(Grid::Elements([groups as u32, 1, 1]))
+            .grid(Grid::Pixels(4 / form.sample.bytes() as u32))
             .read("image", image, Reach::Point);
         for (c, out) in outs.iter().enumerate() {
             pass = pass.write(&format!("c{c}"), *out);

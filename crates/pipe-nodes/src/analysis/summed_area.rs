@@ -4,8 +4,8 @@
 //! (Hensley et al., Fast Summed-Area Table Generation, 2005); the textbook's. *Tiles*, for GPUs: the sums of the
 //! rows and columns of every tile, carried across tiles by two small passes, then the tiles themselves with those
 //! carries: the image is read twice and written once, and no workgroup waits for another (Nehab et al.,
-//! GPU-Efficient Recursive Filtering and Summed-Area Tables, 2011). *Lines*, for CPUs: one thread a row, then one
-//! a column.
+//! GPU-Efficient Recursive Filtering and Summed-Area Tables, 2011), which is also the way of images that do not fit
+//! whole. *Lines*, for CPUs: one thread a row, then one a column.
 //!
 //! Carries are compensated: a table of 8192² is within 1e-5 of the true sums although 2²⁶ floats add up in it,
 //! where a plain running sum is off by percents. A value that is not finite counts as 0, lest it fill the table.
@@ -41,9 +41,10 @@ pub(crate) fn table(cx: &mut Lowering<'_>, suffix: &str, image: ResourceId, way:
     let image = ready(cx, suffix, image, term);
     let ty = cx.image_of(image);
     let build = Build { suffix, size: ty.size, channels: ty.channels };
+    let tiles = cx.limits().profile == Profile::Gpu || cx.limits().tiled;
     match way {
         Way::Steps(radix) => build.steps(cx, image, radix),
-        Way::Scan if cx.limits().profile == Profile::Gpu && build.carry_bytes() <= cx.limits().max_binding_bytes => build.tiles(cx, image),
+        Way::Scan if tiles && build.carry_bytes() <= cx.limits().max_binding_bytes => build.tiles(cx, image),
         Way::Scan => build.lines(cx, image),
     }
 }
@@ -166,7 +167,7 @@ impl Build<'_> {
         let left = carries("left", across * h);
         let above = carries("above", down * w);
         let edges = carries("edges", down * w);
-        let grid = Grid::Groups([across, down, 1]);
+        let grid = Grid::Blocks([self.side(); 2]);
         let side = self.side() as i32;
         let shader = shader!("analysis/sat_tile_sums");
         cx.pass(&self.name("sums"), extended(&shader, &self.texels(&[], &["rows", "columns"])))

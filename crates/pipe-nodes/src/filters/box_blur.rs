@@ -38,14 +38,13 @@ pub(super) fn box_mean(cx: &mut Lowering<'_>, prefix: &str, r: u32, image: Resou
     let shape = cx.shape(out);
     let rows = cx.intermediate(&format!("{prefix}rows"), shape);
     let run = RUN.max(r);
-    let size = cx.image_of(out).size;
     for (suffix, along_x, from, to) in [("rows", true, image, rows), ("columns", false, rows, out)] {
         // A run also sees what entered and left since it began.
         let reach = if along_x { Reach::Around(r + run, 0) } else { Reach::Around(0, r + run) };
-        let grid = if along_x { [size[0].div_ceil(run), size[1], 1] } else { [size[0], size[1].div_ceil(run), 1] };
+        let block = if along_x { [run, 1] } else { [1, run] };
         cx.pass(&format!("{prefix}{suffix}"), shader!("filters/box_blur"))
             .entry(Entry::Each)
-            .grid(Grid::Elements(grid))
+            .grid(Grid::Blocks(block))
             .read("image", from, reach)
             .write("out", to)
             .constant("RADIUS", r as i32)

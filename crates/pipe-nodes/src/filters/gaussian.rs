@@ -31,27 +31,25 @@ pub(super) enum Axis {
 /// Declares a one-dimensional convolution of `image` into `out`.
 pub(super) fn convolve(cx: &mut Lowering<'_>, suffix: &str, axis: Axis, weights: &[f64], image: ResourceId, out: ResourceId) {
     let radius = (weights.len() / 2) as u32;
-    let [w, h] = cx.image_of(out).size;
-    let stage = if axis == Axis::X && cx.limits().profile == Profile::Gpu { Stage::new(radius, w) } else { None };
-    let (reach, runs) = match axis {
-        Axis::X => (Reach::Around(radius, 0), [w.div_ceil(RUN), h, 1]),
-        Axis::Y => (Reach::Around(0, radius), [w, h.div_ceil(RUN), 1]),
+    let width = cx.image_of(out).size[0];
+    let stage = if axis == Axis::X && cx.limits().profile == Profile::Gpu { Stage::new(radius, width) } else { None };
+    let (reach, run) = match axis {
+        Axis::X => (Reach::Around(radius, 0), [RUN, 1]),
+        Axis::Y => (Reach::Around(0, radius), [1, RUN]),
     };
     let table = cx.floats(&format!("{suffix}weights"), &weights.iter().map(|w| *w as f32).collect::<Vec<_>>());
     let pass = match stage {
-        Some(stage) => {
-            let groups = Grid::Groups([w.div_ceil(stage.tile[0]), h.div_ceil(stage.tile[1]), 1]);
-            cx.pass(suffix, shader!("filters/blur_rows_staged"))
-                .entry(Entry::Kernel)
-                .grid(groups)
-                .constant("WIDTH", stage.tile[0] as i32)
-                .constant("HEIGHT", stage.tile[1] as i32)
-                .constant("QUADS", stage.quads as i32)
-        }
+        Some(stage) => cx
+            .pass(suffix, shader!("filters/blur_rows_staged"))
+            .entry(Entry::Kernel)
+            .grid(Grid::Blocks(stage.tile))
+            .constant("WIDTH", stage.tile[0] as i32)
+            .constant("HEIGHT", stage.tile[1] as i32)
+            .constant("QUADS", stage.quads as i32),
         None => cx
             .pass(suffix, shader!("filters/blur_run"))
             .entry(Entry::Each)
-            .grid(Grid::Elements(runs))
+            .grid(Grid::Blocks(run))
             .constant("ALONG_X", axis == Axis::X)
             .constant("RUN", RUN as i32),
     };

@@ -61,18 +61,18 @@ pub(super) fn recursive_axis(cx: &mut Lowering<'_>, suffix: &str, axis: Axis, si
     if sigma < LEAST_SIGMA {
         return convolve(cx, suffix, axis, &wide_weights(sigma), image, out);
     }
-    let (shape, size) = (cx.shape(out), cx.image_of(out).size);
+    let shape = cx.shape(out);
     let forward = cx.intermediate(&format!("{suffix}.forward"), shape);
     let Response { poles, gains } = response(sigma);
     let warm = (WARM * sigma).ceil() as u32;
     let run = 128.max(2 * warm);
     let along_x = axis == Axis::X;
     let reach = if along_x { Reach::Around(run + warm, 0) } else { Reach::Around(0, run + warm) };
-    let grid = if along_x { [size[0].div_ceil(run), size[1], 1] } else { [size[0], size[1].div_ceil(run), 1] };
+    let block = if along_x { [run, 1] } else { [1, run] };
     for (name, backward) in [("forward", false), ("backward", true)] {
         let shader = if backward { shader!("filters/recursive_backward") } else { shader!("filters/recursive_forward") };
         let mut pass =
-            cx.pass(&format!("{suffix}.{name}"), shader).entry(Entry::Each).grid(Grid::Elements(grid)).read("image", image, reach);
+            cx.pass(&format!("{suffix}.{name}"), shader).entry(Entry::Each).grid(Grid::Blocks(block)).read("image", image, reach);
         if backward {
             pass = pass.read("forward", forward, reach);
         }

@@ -91,10 +91,9 @@ impl Medium {
         [state, out]: [ResourceId; 2],
     ) -> PassBuilder<'b, 'a> {
         let core = 64 - 2 * steps;
-        let [w, h] = cx.image_of(state).size;
         self.pass_behind(cx, suffix, [&shader!("simulation/blocked"), shader], Reach::Around(steps, steps), state)
             .entry(Entry::Kernel)
-            .grid(Grid::Groups([w.div_ceil(core), h.div_ceil(core), 1]))
+            .grid(Grid::Blocks([core; 2]))
             .write("out", out)
             .constant("STEPS", steps as i32)
             .constant("FIXED", self.boundary == Boundary::Dirichlet)

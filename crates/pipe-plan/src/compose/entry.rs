@@ -18,7 +18,8 @@ use crate::kernel_pass::{KernelPass, Ops, Source};
 const LONG_TABLE: u32 = 1 << 18;
 
 /// How the grid is covered.
-pub(super) struct Cover {
+#[derive(Debug, Clone)]
+pub(crate) struct Cover {
     /// Elements along x, y, z; `None` when it is the size of the first output, asked at run time.
     elements: [u32; 3],
     /// Threads of a workgroup.
@@ -27,26 +28,37 @@ pub(super) struct Cover {
     each: u32,
     axis: usize,
     /// Workgroups.
-    pub(super) groups: [u32; 3],
+    pub(crate) groups: [u32; 3],
     /// Type of the position: `vec2i`, `vec3i` or `i32`.
     position: &'static str,
+    /// Whether it is the grid of a tile.
+    tiled: bool,
 }
 
 impl Cover {
-    pub(super) fn new(pass: &KernelPass, ops: &Ops, limits: &Limits) -> Result<Self, PlanError> {
+    /// How `pass` is covered. A pass of tiles covers as much as the largest tile asks for, from where its uniforms say.
+    pub(super) fn new(pass: &KernelPass, ops: &Ops, limits: &Limits, tiled: bool) -> Result<Self, PlanError> {
         let stage = pass.last();
         let shape = ops.shape(pass.writes[0].resource);
         let position = position(stage.entry, &stage.shader.source, shape);
         let elements = match (pass.grid, shape) {
-            (Grid::Groups(groups), _) => return Self::fixed(pass, groups, limits, position),
+            (Grid::Groups(groups), _) => groups,
             (Grid::Elements(n), _) => n,
+            (Grid::Blocks(block), _) => {
+                let size = pass.plane(ops).unwrap_or([1, 1]);
+                [size[0].div_ceil(block[0]), size[1].div_ceil(block[1]), 1]
+            }
+            (Grid::Pixels(per), _) => {
+                let [w, h] = shape.plane().unwrap_or([1, 1]).map(u64::from);
+                [(w * h).div_ceil(per.into()) as u32, 1, 1]
+            }
             (Grid::Cover, Shape::Image(t)) => [t.size[0], t.size[1], 1],
             (Grid::Cover, Shape::Volume(t)) => t.size,
-            (Grid::Cover, Shape::Table { len, .. } | Shape::Words { len }) => [len, 1, 1],
-            (Grid::Cover, Shape::Scalar) => [1, 1, 1],
+            (Grid::Cover, _) => [shape.entries(), 1, 1],
         };
-        if stage.entry == Entry::Points {
-            return Ok(Self { elements, size: [1; 3], each: 1, axis: 0, groups: elements, position });
+        if matches!(stage.entry, Entry::Points | Entry::Kernel) {
+            let cover = Self { elements, size: [1; 3], each: 1, axis: 0, groups: elements, position, tiled };
+            return if stage.entry == Entry::Points { Ok(cover) } else { cover.checked(pass, limits) };
         }
         let cpu = limits.profile == Profile::Cpu;
         let small = matches!(shape, Shape::Image(t) if t.channels < 4 || t.precision == Precision::F16);
@@ -63,20 +75,18 @@ impl Cover {
             // Long tables, such as the words of a file, are bound by threads too.
             _ => ([256, 1, 1], if elements[0] >= LONG_TABLE { 4 } else { 1 }, 0),
         };
-        let mut groups = [0; 3];
-        for i in 0..3 {
-            let per_group = size[i] * if i == axis { each } else { 1 };
-            groups[i] = elements[i].div_ceil(per_group).max(1);
+        let mut cover = Self { elements, size, each, axis, groups: [0; 3], position, tiled };
+        cover.groups = cover.groups_of(elements);
+        if position == "i32" && cover.groups[0] > limits.max_groups {
+            cover.groups[1] = cover.groups[0].div_ceil(limits.max_groups);
+            cover.groups[0] = limits.max_groups;
         }
-        if position == "i32" && groups[0] > limits.max_groups {
-            groups[1] = groups[0].div_ceil(limits.max_groups);
-            groups[0] = limits.max_groups;
-        }
-        Self { elements, size, each, axis, groups, position }.checked(pass, limits)
+        cover.checked(pass, limits)
     }
 
-    fn fixed(pass: &KernelPass, groups: [u32; 3], limits: &Limits, position: &'static str) -> Result<Self, PlanError> {
-        Self { elements: [0; 3], size: [1; 3], each: 1, axis: 0, groups, position }.checked(pass, limits)
+    /// Workgroups that cover so many elements.
+    pub(crate) fn groups_of(&self, elements: [u32; 3]) -> [u32; 3] {
+        std::array::from_fn(|i| elements[i].div_ceil(self.size[i] * if i == self.axis { self.each } else { 1 }).max(1))
     }
 
     fn checked(self, pass: &KernelPass, limits: &Limits) -> Result<Self, PlanError> {
@@ -154,10 +164,10 @@ pub(super) fn main_module(pass: &KernelPass, cover: &Cover, ops: &Ops, index: &d
         }
         _ => {
             // The size of a covered image is asked from the image, so that one kernel serves all sizes.
-            let size = if pass.grid == Grid::Cover {
-                format!("package::io::size_r{}()", index(pass.writes[0].resource, true))
-            } else {
-                format!("vec2i({nx}, {ny})")
+            let (first, end) = match pass.grid {
+                _ if cover.tiled => ("package::io::uniforms.grid_first + ", "package::io::uniforms.grid_end".to_owned()),
+                Grid::Cover => ("", format!("package::io::size_r{}()", index(pass.writes[0].resource, true))),
+                _ => ("", format!("vec2i({nx}, {ny})")),
             };
             let each = cover.each;
             let (px, py) = if cover.axis == 0 { (sx * each, sy) } else { (sx, sy * each) };
@@ -166,9 +176,9 @@ pub(super) fn main_module(pass: &KernelPass, cover: &Cover, ops: &Ops, index: &d
             let step = if cover.axis == 0 { format!("vec2i(t * {sx}, 0)") } else { "vec2i(0, t)".to_owned() };
             let _ = write!(
                 text,
-                "    let size = {size};\n\
-                 \x20   let start = vec2i(group.xy * vec2u({px}u, {py}u) + local.xy{});\n\
-                 \x20   for (var t = 0; t < {each}; t++) {{\n        let at = start + {step};\n        if all(at < size) {{ {body} }}\n    }}\n",
+                "    let end = {end};\n\
+                 \x20   let start = {first}vec2i(group.xy * vec2u({px}u, {py}u) + local.xy{});\n\
+                 \x20   for (var t = 0; t < {each}; t++) {{\n        let at = start + {step};\n        if all(at < end) {{ {body} }}\n    }}\n",
                 if cover.axis == 1 && sy > 1 { format!(" * vec2u(1u, {each}u)") } else { String::new() },
             );
         }

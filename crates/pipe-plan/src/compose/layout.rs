@@ -6,9 +6,33 @@ use pipe_graph::pass::{Constant, Entry, ResourceId, Value};
 
 use crate::kernel_pass::{KernelPass, Stage};
 
-/// Where each parameter stands.
+/// Where each parameter stands, and behind the parameters what a kernel must know of its tile.
 pub(super) struct Block {
     fields: Vec<Field>,
+    places: Vec<Place>,
+    bytes: usize,
+}
+
+/// A `vec2i` that differs from tile to tile.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct Place {
+    /// What it is.
+    pub(crate) what: Placed,
+    /// Its name in the block.
+    bound: usize,
+    /// Byte offset in the block.
+    pub(crate) offset: usize,
+}
+
+/// What a kernel is told of its tile.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Placed {
+    /// The first pixel (or block) that the grid covers, and the one behind its last.
+    GridFirst,
+    GridEnd,
+    /// The first pixel of a window, and its size.
+    First(ResourceId),
+    Size(ResourceId),
 }
 
 struct Field {
@@ -51,7 +75,8 @@ fn words(value: &Value) -> Vec<u8> {
 }
 
 impl Block {
-    pub(super) fn new(pass: &KernelPass) -> Self {
+    /// The block of a pass; `windowed` are the bound resources of which only a window is held, by their number.
+    pub(super) fn new(pass: &KernelPass, windowed: Option<&[(usize, ResourceId)]>) -> Self {
         let mut fields = Vec::new();
         let mut offset = 0_usize;
         for (stage, s) in pass.stages.iter().enumerate() {
@@ -65,13 +90,26 @@ impl Block {
                 offset += bytes;
             }
         }
-        Self { fields }
+        let mut places = Vec::new();
+        if let Some(windowed) = windowed {
+            let of_windows = windowed.iter().flat_map(|(i, id)| [(Placed::First(*id), *i), (Placed::Size(*id), *i)]);
+            for (what, bound) in [(Placed::GridFirst, 0), (Placed::GridEnd, 0)].into_iter().chain(of_windows) {
+                offset = offset.next_multiple_of(8);
+                places.push(Place { what, bound, offset });
+                offset += 8;
+            }
+        }
+        Self { fields, places, bytes: offset }
     }
 
-    /// The content, padded to 16 bytes; empty when there are no parameters.
+    /// What differs from tile to tile.
+    pub(super) fn into_places(self) -> Vec<Place> {
+        self.places
+    }
+
+    /// The content, padded to 16 bytes, without what differs from tile to tile; empty when there is nothing in it.
     pub(super) fn bytes(&self, pass: &KernelPass) -> Vec<u8> {
-        let end = self.fields.last().map_or(0, |f| f.offset + f.bytes);
-        let mut out = vec![0; end.next_multiple_of(16)];
+        let mut out = vec![0; self.bytes.next_multiple_of(16)];
         for f in &self.fields {
             out[f.offset..f.offset + f.bytes].copy_from_slice(&words(&pass.stages[f.stage].params[&f.name]));
         }
@@ -79,7 +117,15 @@ impl Block {
     }
 
     pub(super) fn declaration(&self) -> String {
-        let fields: String = self.fields.iter().map(|f| format!("    s{}_{}: {},\n", f.stage, f.name, f.ty)).collect();
+        let mut fields: String = self.fields.iter().map(|f| format!("    s{}_{}: {},\n", f.stage, f.name, f.ty)).collect();
+        for place in &self.places {
+            let _ = match place.what {
+                Placed::GridFirst => writeln!(fields, "    grid_first: vec2i,"),
+                Placed::GridEnd => writeln!(fields, "    grid_end: vec2i,"),
+                Placed::First(_) => writeln!(fields, "    r{}_first: vec2i,", place.bound),
+                Placed::Size(_) => writeln!(fields, "    r{}_size: vec2i,", place.bound),
+            };
+        }
         format!("struct Uniforms {{\n{fields}}}\n@group(0) @binding(0) var<uniform> uniforms: Uniforms;\n")
     }
 

@@ -21,12 +21,16 @@ use std::fmt::Write as _;
 use std::sync::Arc;
 
 use indexmap::IndexMap;
-use pipe_graph::pass::{Access, Entry, Limits, ResourceId, Shape};
+use pipe_graph::pass::{Access, Entry, Grid, Limits, ResourceId, Shape};
 use pipe_graph::wgsl::LIBRARY;
 
 use crate::PlanError;
-use crate::kernel_pass::{KernelPass, Ops, Source};
+use crate::kernel_pass::{KernelPass, Ops, Source, StagePort};
 use crate::plan::{Binding, Kernel, KernelId, Launch};
+use crate::window::Windows;
+
+pub(crate) use entry::Cover;
+pub(crate) use layout::{Place, Placed};
 
 /// What a composed pass binds and launches.
 pub(crate) struct Composed {
@@ -34,7 +38,9 @@ pub(crate) struct Composed {
     /// Bound resources in binding order, the uniform block left out.
     pub(crate) resources: Vec<ResourceId>,
     pub(crate) uniforms: Vec<u8>,
-    pub(crate) groups: [u32; 3],
+    /// What in the uniform block differs from tile to tile.
+    pub(crate) places: Vec<Place>,
+    pub(crate) cover: Cover,
 }
 
 /// A kernel whose modules are written and not put together yet.
@@ -74,11 +80,17 @@ impl<'a> Composer<'a> {
         self.limits
     }
 
-    /// Writes the modules of a pass.
-    pub(crate) fn compose(&mut self, pass: &KernelPass) -> Result<Composed, PlanError> {
+    /// Writes the modules of a pass; of a tile's with the windows of what is held in part.
+    pub(crate) fn compose(&mut self, pass: &KernelPass, windows: Option<&Windows>) -> Result<Composed, PlanError> {
         let bound = self.bound(pass);
         let drivers: Vec<ResourceId> = distinct(pass.drivers());
-        let block = layout::Block::new(pass);
+        let windowed = windows.map(|w| {
+            let image_written = |b: &Bound| b.use_ != Use::Read && matches!(b.shape, Shape::Image(_));
+            let held = bound.iter().enumerate().filter(|(_, b)| w.halos.contains_key(&b.resource) || image_written(b));
+            held.map(|(i, b)| (i, b.resource)).collect::<Vec<_>>()
+        });
+        let in_part = |id: ResourceId| windows.filter(|w| w.halos.contains_key(&id));
+        let block = layout::Block::new(pass, windowed.as_deref());
         let uniforms = block.bytes(pass);
         let has_uniform = !uniforms.is_empty();
         let kernel_entry = pass.last().entry == Entry::Kernel;
@@ -94,7 +106,13 @@ impl<'a> Composer<'a> {
             let at = bindings.len();
             bindings.push(ports::binding(b.shape, b.use_, self.limits));
             resources.push(b.resource);
-            ports::declare(&mut io, i, at, b.shape, b.use_, self.limits);
+            match (b.shape, windows) {
+                (Shape::Image(t), Some(w)) if in_part(b.resource).is_some() => {
+                    ports::declare_window(&mut io, i, at, t, b.use_, w.size, self.limits);
+                }
+                (Shape::Image(t), Some(_)) if b.use_ != Use::Read => ports::declare_tile(&mut io, i, at, t, self.limits),
+                _ => ports::declare(&mut io, i, at, b.shape, b.use_, self.limits),
+            }
         }
         for (i, id) in drivers.iter().enumerate() {
             let at = bindings.len();
@@ -127,17 +145,28 @@ impl<'a> Composer<'a> {
                     Source::Read(r) => ports::Raw::Bound(index(pass.reads[r], false)),
                     Source::Stage(producer) => ports::Raw::Stage { producer, size: self.size_source(pass, producer, &index) },
                 };
+                if let Some((id, size)) = self.pixels(pass, port) {
+                    ports::pixels_port(&mut text, &port.name, index(id, false), size, in_part(id).is_some());
+                }
                 ports::read_port(&mut text, port, raw);
             }
             for write in pass.writes.iter().filter(|w| w.stage == s && stage.entry != Entry::Points) {
                 let i = index(write.resource, true);
-                ports::write_port(&mut text, &write.port, i, self.ops.shape(write.resource), write.access);
+                let shape = self.ops.shape(write.resource);
+                if let Shape::Pixels { size, .. } = shape {
+                    ports::pixels_port(&mut text, &write.port, i, size, in_part(write.resource).is_some());
+                }
+                ports::write_port(&mut text, &write.port, i, shape, write.access);
             }
             block.params(&mut text, s, stage, &drivers);
             let size = pass.writes.iter().find(|w| w.stage == s).or(pass.writes.first()).map(|w| index(w.resource, true));
             ports::place(&mut text, size.expect("a pass writes something"), stage);
             if stage.entry == Entry::Point {
                 ports::point_value(&mut text, s, pass, &index);
+            }
+            if let (Grid::Blocks(_), true) = (pass.grid, kernel_entry && s == main) {
+                let first = if windows.is_some() { "package::io::uniforms.grid_first + " } else { "" };
+                let _ = writeln!(text, "fn block(group: vec3u) -> vec2i {{ return {first}vec2i(group.xy); }}");
             }
             let name = if kernel_entry && s == main {
                 layout::bind_in_main(&mut text, pass);
@@ -147,9 +176,9 @@ impl<'a> Composer<'a> {
             };
             modules.push((name, text));
         }
-        let grid = entry::Cover::new(pass, self.ops, self.limits)?;
+        let cover = Cover::new(pass, self.ops, self.limits, windows.is_some())?;
         if !kernel_entry {
-            modules.push(("main".to_owned(), entry::main_module(pass, &grid, self.ops, &index)));
+            modules.push(("main".to_owned(), entry::main_module(pass, &cover, self.ops, &index)));
         }
         let trusted = pass.stages.iter().all(|s| s.shader.trusted);
         let labels: Vec<&str> = pass.stages.iter().map(|s| &*s.shader.path).collect();
@@ -162,7 +191,16 @@ impl<'a> Composer<'a> {
         let entry = self.kernels.entry(Source0 { modules, trusted });
         let id = KernelId(entry.index() as u32);
         entry.or_insert(kernel);
-        Ok(Composed { kernel: id, resources, uniforms, groups: grid.groups })
+        Ok(Composed { kernel: id, resources, uniforms, places: block.into_places(), cover })
+    }
+
+    /// Width and height of the pixels of a file behind a port.
+    fn pixels(&self, pass: &KernelPass, port: &StagePort) -> Option<(ResourceId, [u32; 2])> {
+        let Source::Read(r) = port.source else { return None };
+        match self.ops.shape(pass.reads[r]) {
+            Shape::Pixels { size, .. } => Some((pass.reads[r], size)),
+            _ => None,
+        }
     }
 
     fn bound(&self, pass: &KernelPass) -> Vec<Bound> {

@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 
 use pipe_graph::pass::{Access, Border, Entry, Filter, Limits, ResourceId, Shape};
-use pipe_graph::types::{Element, Precision};
+use pipe_graph::types::{Element, ImageType, Precision};
 
 use super::Use;
 use crate::kernel_pass::{KernelPass, Source, Stage, StagePort};
@@ -65,11 +65,40 @@ fn element(shape: Shape) -> &'static str {
     }
 }
 
-fn len(shape: Shape) -> u32 {
-    match shape {
-        Shape::Table { len, .. } | Shape::Words { len } => len,
-        _ => 1,
-    }
+/// Declares an image of which only a window is held: positions are those in the whole image, of this size.
+pub(super) fn declare_window(io: &mut String, i: usize, at: usize, image: ImageType, use_: Use, size: [u32; 2], limits: &Limits) {
+    let head = format!("@group(0) @binding({at})");
+    let [w, h] = size;
+    let _ = match use_ {
+        // Loops compute more than the window holds; nobody uses what they make of the pixels at its edge.
+        Use::Read => writeln!(
+            io,
+            "{head} var r{i}: texture_2d<f32>;\n\
+             fn fetch_r{i}(p: vec2i) -> vec4f {{ \
+             let v = textureLoad(r{i}, clamp(p - uniforms.r{i}_first, vec2i(0), uniforms.r{i}_size - 1), 0); return {}; }}",
+            grey("v", image.channels)
+        ),
+        Use::Write(_) => writeln!(
+            io,
+            "{head} var r{i}: texture_storage_2d<{}, write>;\n\
+             fn put_r{i}(p: vec2i, v: vec4f) {{ let q = p - uniforms.r{i}_first; \
+             if all(q >= vec2i(0)) && all(q < uniforms.r{i}_size) {{ textureStore(r{i}, q, v); }} }}",
+            texel(image.channels, image.precision, limits)
+        ),
+    };
+    let _ = writeln!(io, "fn size_r{i}() -> vec2i {{ return vec2i({w}, {h}); }}");
+}
+
+/// Declares an image that is held whole and written tile by tile: what belongs to other tiles is left alone.
+pub(super) fn declare_tile(io: &mut String, i: usize, at: usize, image: ImageType, limits: &Limits) {
+    let _ = writeln!(
+        io,
+        "@group(0) @binding({at}) var r{i}: texture_storage_2d<{}, write>;\n\
+         fn size_r{i}() -> vec2i {{ return vec2i(textureDimensions(r{i})); }}\n\
+         fn put_r{i}(p: vec2i, v: vec4f) {{ let q = p - uniforms.r{i}_first; \
+         if all(q >= vec2i(0)) && all(q < uniforms.r{i}_size) {{ textureStore(r{i}, p, v); }} }}",
+        texel(image.channels, image.precision, limits)
+    );
 }
 
 /// Declares binding `at` as resource `i`, with `size_rI`, `fetch_rI` or `put_rI`.
@@ -127,6 +156,20 @@ pub(super) fn declare(io: &mut String, i: usize, at: usize, shape: Shape, use_: 
             let ty = element(shape);
             writeln!(io, "{head} var<storage, read_write> r{i}: array<{ty}>;\nfn put_r{i}(p: i32, v: {ty}) {{ r{i}[p] = v; }}")
         }
+    };
+}
+
+/// `first_NAME` and `held_NAME` of pixels of a file: which pixels of the picture the table holds.
+pub(super) fn pixels_port(text: &mut String, n: &str, i: usize, size: [u32; 2], windowed: bool) {
+    let _ = if windowed {
+        writeln!(
+            text,
+            "fn first_{n}() -> vec2i {{ return package::io::uniforms.r{i}_first; }}\n\
+             fn held_{n}() -> vec2i {{ return package::io::uniforms.r{i}_size; }}"
+        )
+    } else {
+        let [w, h] = size;
+        writeln!(text, "fn first_{n}() -> vec2i {{ return vec2i(0); }}\nfn held_{n}() -> vec2i {{ return vec2i({w}, {h}); }}")
     };
 }
 
@@ -202,9 +245,9 @@ pub(super) fn read_port(text: &mut String, port: &StagePort, raw: Raw) {
             let Raw::Bound(i) = raw else { unreachable!("only images are values of stages") };
             let _ = writeln!(text, "fn load_{n}() -> vec4f {{ return package::io::r{i}; }}");
         }
-        Shape::Table { .. } | Shape::Words { .. } => {
+        Shape::Table { .. } | Shape::Words { .. } | Shape::Pixels { .. } => {
             let Raw::Bound(i) = raw else { unreachable!("only images are values of stages") };
-            let (ty, len) = (element(port.shape), len(port.shape));
+            let (ty, len) = (element(port.shape), port.shape.entries());
             let _ = writeln!(
                 text,
                 "fn size_{n}() -> i32 {{ return {len}; }}\n\
@@ -228,8 +271,8 @@ pub(super) fn write_port(text: &mut String, n: &str, i: usize, shape: Shape, acc
              fn store_{n}(xyz: vec3i, v: vec4f) {{ if all(xyz >= vec3i(0)) && all(xyz < size_{n}()) {{ package::io::put_r{i}(xyz, v); }} }}"
         ),
         Shape::Scalar => writeln!(text, "fn store_{n}(v: vec4f) {{ package::io::put_r{i}(0, v); }}"),
-        Shape::Table { .. } | Shape::Words { .. } => {
-            let (ty, len) = (element(shape), len(shape));
+        Shape::Table { .. } | Shape::Words { .. } | Shape::Pixels { .. } => {
+            let (ty, len) = (element(shape), shape.entries());
             let _ = writeln!(text, "fn size_{n}() -> i32 {{ return {len}; }}");
             match access {
                 Access::Store => {

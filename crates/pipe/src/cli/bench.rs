@@ -64,7 +64,7 @@ fn one(session: &mut Session, a: &BenchArgs, size: [u32; 2]) -> Result<Value, Fa
     let copy_gb_s = session.copy_bandwidth(size)?;
     let mut reports: Vec<Report> = Vec::new();
     for run in 0..=a.runs.max(1) {
-        let report = session.execute(&job, &inputs, None, None)?.report;
+        let report = session.execute(&job, &mut inputs, None, None)?.report;
         // The first run compiles and allocates.
         if run > 0 {
             reports.push(report);
@@ -113,6 +113,7 @@ fn collect(steps: &[Step], times: u64, passes: &mut IndexMap<String, (Vec<String
             Step::Repeat(r) => {
                 collect(&r.first, times * u64::from(r.count.least()), passes);
             }
+            Step::Tiles(t) => collect(&t.body, times * t.tiles.len() as u64, passes),
         }
     }
 }

@@ -62,14 +62,14 @@ pub(super) fn run(a: &RunArgs) -> Result<(), Failure> {
                 let inputs = decode(&job, &kinds);
                 (opening.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic)), inputs)
             });
-            let (mut session, inputs) = (session?, inputs?);
+            let (mut session, mut inputs) = (session?, inputs?);
             let decoded = started.elapsed().as_secs_f64() * 1e3;
             let bar = output::progress(1, "iterations");
             let tell = |done: u32, of: u32| {
                 bar.set_length(of.into());
                 bar.set_position(done.into());
             };
-            let finished = session.execute(&job, &inputs, Some(&cancel), Some(&tell));
+            let finished = session.execute(&job, &mut inputs, Some(&cancel), Some(&tell));
             bar.finish_and_clear();
             let mut finished = finished?;
             finished.report.wall.decode = decoded;
