@@ -7,7 +7,7 @@
 use indexmap::IndexMap;
 use pipe_graph::pass::{
     Access, Border, Constant, Count, Entry, Filter, Grid, Item, NodeLabel, Pass, PassGraph, Reach, Resource, ResourceId, Shader, Shape,
-    State, Value,
+    State, Value, Workspace,
 };
 
 /// Where a port's values come from.
@@ -29,6 +29,16 @@ pub(crate) struct StagePort {
     pub(crate) once: bool,
     pub(crate) border: Border,
     pub(crate) filter: Filter,
+}
+
+impl StagePort {
+    /// Width and height of the image that it reads.
+    pub(crate) fn image_size(&self) -> [u32; 2] {
+        match self.shape {
+            Shape::Image(t) => t.size,
+            _ => [1, 1],
+        }
+    }
 }
 
 /// One shader instance.
@@ -123,6 +133,19 @@ impl KernelPass {
     /// The stage that gives the pass its entry.
     pub(crate) fn last(&self) -> &Stage {
         self.stages.last().expect("a pass has a stage")
+    }
+
+    /// The port of the image that a fold walks.
+    pub(crate) fn image_of_fold(&self) -> &StagePort {
+        self.last().ports.iter().find(|p| matches!(p.shape, Shape::Image(_))).expect("a fold reads an image")
+    }
+
+    /// What each of its folds needs of workgroup memory.
+    pub(crate) fn folds(&self) -> impl Iterator<Item = Workspace> + '_ {
+        self.stages.iter().filter_map(|s| match s.entry {
+            Entry::Fold(workspace) => Some(workspace),
+            _ => None,
+        })
     }
 
     /// Scalars that drive parameters.
