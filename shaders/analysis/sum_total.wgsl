@@ -1,5 +1,5 @@
-// The sums of all tiles → one number for each component: FINISH 0 the mean, 1 the exponential of the mean, 2 the
-// square root of the mean, 3 how many values took part. 0 when none did.
+// The sums of all tiles → one number for each component: FINISH 0 the mean, 1 the exponential of the mean, 2 how
+// many values took part. 0 when none did.
 
 import package::lib::wide::sum_error;
 
@@ -20,9 +20,6 @@ fn finish(total: vec4f, count: vec4f) -> vec4f {
         return select(vec4f(), exp(mean), count > vec4f(0.0));
     }
     if FINISH == 2 {
-        return sqrt(max(mean, vec4f()));
-    }
-    if FINISH == 3 {
         return count;
     }
     return mean;

@@ -293,9 +293,42 @@ pub enum Entry {
     Each,
     /// `@compute @workgroup_size(…) fn main(…)` with its own workgroups.
     Kernel,
+    /// `fn begin()`, `fn take(xy: vec2i, v: vec4f)` for each pixel of its one image read in order, `fn end()`: a reduction
+    /// over a [`Grid::Walk`]. Folds over the same image share one walk.
+    Fold(Workspace),
     /// `fn vertex(index: u32) -> vec4f` (clip-space point; w = 0 drops it) and `fn fragment() -> vec4f`: one
     /// point a vertex, blended additively into the first output, an image.
     Points,
+}
+
+/// What a fold needs of workgroup memory, of which all folds of a kernel together have 16 KiB.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+pub struct Workspace {
+    /// Bytes that its shader declares by itself.
+    pub own: u32,
+    /// `vec4f`s of the scratch that the folds of a kernel use one after the other.
+    pub scratch: u32,
+}
+
+/// How workgroups walk an image: each takes a tile, each lane the pixels of the tile at a stride of the group, row after row.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub struct Walk {
+    /// Threads of a workgroup along x and y.
+    pub lanes: [u32; 2],
+    /// Pixels of a tile along x and y, multiples of the lanes.
+    pub tile: [u32; 2],
+}
+
+impl Walk {
+    /// How many workgroups walk an image of this size.
+    pub fn groups(&self, size: [u32; 2]) -> [u32; 2] {
+        std::array::from_fn(|i| size[i].div_ceil(self.tile[i]))
+    }
+
+    /// Threads of a workgroup.
+    pub const fn lane_count(&self) -> u32 {
+        self.lanes[0] * self.lanes[1]
+    }
 }
 
 /// How many invocations or workgroups run.
@@ -314,6 +347,8 @@ pub enum Grid {
     Blocks([u32; 2]),
     /// One call for each so many pixels of the first output, pixels of a file.
     Pixels(u32),
+    /// Every pixel of the image of a `Fold`, each once.
+    Walk(Walk),
 }
 
 /// A constant of the shader module: part of the kernel's text.

@@ -611,14 +611,14 @@ impl Launched {
         let written = self.pass.writes.iter().filter_map(|w| windows.halos.get(&w.resource));
         let halo = written.copied().reduce(Halo::union);
         let covered = windows.widened(tile, halo.unwrap_or_default());
-        match self.pass.grid {
-            Grid::Blocks(block) => {
+        match (self.pass.block(), self.pass.grid) {
+            (Some(block), _) => {
                 // A block that makes pixels runs wherever the window meets it; others in the tile that they begin in.
                 let first = |n: u32, i: usize| if self.makes_pixels { n / block[i] } else { n.div_ceil(block[i]) };
                 let axis = |range: &Range<u32>, i: usize| first(range.start, i)..range.end.div_ceil(block[i]);
                 Rect { x: axis(&covered.x, 0), y: axis(&covered.y, 1) }
             }
-            Grid::Pixels(per) => Rect { x: 0..(covered.area().div_ceil(per.into())) as u32, y: 0..1 },
+            (_, Grid::Pixels(per)) => Rect { x: 0..(covered.area().div_ceil(per.into())) as u32, y: 0..1 },
             _ => covered,
         }
     }

@@ -18,14 +18,20 @@
 //! point passes become one kernel, decoding of a file joins what first uses the pixels, and packing for a file joins
 //! what made them.
 //!
+//! Reductions (`Fold`) that walk the same image share one walk, and so one read, when neither needs what the other leads
+//! to; what makes the image is then computed inside it.
+//!
 //! Equal passes over equal inputs are computed once. Every decision is recorded for `pipe plan --after fuse`.
+
+mod folds;
 
 use std::collections::{BTreeMap, BTreeSet};
 
 use pipe_graph::pass::{Access, Count, Entry, Grid, Limits, Reach, ResourceId, Shape};
 use pipe_graph::types::Precision;
 
-use crate::kernel_pass::{KernelPass, LoopOp, Op, Ops, Source};
+use crate::kernel_pass::{KernelPass, LoopOp, Op, Ops, Source, Stage};
+use folds::is_fold;
 
 /// Most loads that a stencil may make of a value that is computed anew for each.
 const MOST_TAPS: u32 = 9;
@@ -73,12 +79,16 @@ fn region(list: Vec<Op>, ops: &Ops, outside: &BTreeSet<ResourceId>, how: (&Limit
         .collect();
     let (limits, thrift) = how;
     let mut fusion = Fusion { list: share_equal(list, outside, log), ops, outside, limits, thrift, log, said: BTreeSet::new() };
+    // Reductions come together before each would take a copy of the image's producer in.
+    fusion.everywhere(Fusion::join_folds);
     fusion.everywhere(Fusion::fold);
+    fusion.everywhere(Fusion::join_folds);
     fusion.everywhere(Fusion::fold_into_all);
     fusion.everywhere(Fusion::fold);
     fusion.everywhere(Fusion::join);
     // What was joined may have become foldable.
     fusion.everywhere(Fusion::fold);
+    fusion.everywhere(Fusion::join_folds);
     fusion.list
 }
 
@@ -332,6 +342,10 @@ impl Fusion<'_> {
 /// At how many places a pass loads a value for each that it makes (or that there is, when it loads each once).
 fn taps(consumer: &KernelPass, result: ResourceId) -> Result<u32, String> {
     let at = consumer.reads.iter().position(|r| *r == result).ok_or("it is read by a parameter only")?;
+    if is_fold(consumer) {
+        // However many folds take a pixel, it is loaded once.
+        return Ok(1);
+    }
     consumer.stages.iter().flat_map(|s| &s.ports).filter(|p| p.source == Source::Read(at)).try_fold(0_u32, |taps, port| {
         let more = match port.reach {
             Reach::Point => 1,
@@ -392,9 +406,33 @@ fn join(first: &KernelPass, second: &KernelPass) -> KernelPass {
             }
         }
     }
+    share_stages(&mut joined);
     drop_unread(&mut joined);
     joined.name = join_names(&first.name, &second.name);
     joined
+}
+
+/// Takes Point stages away that compute what an earlier one computes, as when both passes decode the same file.
+fn share_stages(pass: &mut KernelPass) {
+    let mut kept: Vec<Stage> = Vec::new();
+    let mut place: Vec<usize> = Vec::new();
+    for (s, mut stage) in std::mem::take(&mut pass.stages).into_iter().enumerate() {
+        for port in &mut stage.ports {
+            if let Source::Stage(k) = &mut port.source {
+                *k = place[*k];
+            }
+        }
+        let stored = pass.writes.iter().any(|w| w.stage == s);
+        let twin = kept.iter().position(|other| !stored && stage.entry == Entry::Point && *other == stage);
+        place.push(twin.unwrap_or(kept.len()));
+        if twin.is_none() {
+            kept.push(stage);
+        }
+    }
+    pass.stages = kept;
+    for write in &mut pass.writes {
+        write.stage = place[write.stage];
+    }
 }
 
 fn join_names(a: &str, b: &str) -> String {

@@ -7,7 +7,7 @@
 use indexmap::IndexMap;
 use pipe_graph::pass::{
     Access, Border, Constant, Count, Entry, Filter, Grid, Item, NodeLabel, Pass, PassGraph, Reach, Resource, ResourceId, Shader, Shape,
-    State, Value,
+    State, Value, Workspace,
 };
 
 use crate::window::Windows;
@@ -31,6 +31,16 @@ pub(crate) struct StagePort {
     pub(crate) once: bool,
     pub(crate) border: Border,
     pub(crate) filter: Filter,
+}
+
+impl StagePort {
+    /// Width and height of the image that it reads.
+    pub(crate) fn image_size(&self) -> [u32; 2] {
+        match self.shape {
+            Shape::Image(t) => t.size,
+            _ => [1, 1],
+        }
+    }
 }
 
 /// One shader instance.
@@ -133,6 +143,28 @@ impl KernelPass {
         let written = self.writes.iter().find_map(|w| ops.shape(w.resource).plane());
         let once = || self.stages.iter().flat_map(|s| &s.ports).filter(|p| p.once).find_map(|p| p.shape.plane());
         written.or_else(once)
+    }
+
+    /// Width and height of the blocks in which it takes the pixels.
+    pub(crate) const fn block(&self) -> Option<[u32; 2]> {
+        match self.grid {
+            Grid::Blocks(block) => Some(block),
+            Grid::Walk(walk) => Some(walk.tile),
+            _ => None,
+        }
+    }
+
+    /// The port of the image that a fold walks.
+    pub(crate) fn image_of_fold(&self) -> &StagePort {
+        self.last().ports.iter().find(|p| matches!(p.shape, Shape::Image(_))).expect("a fold reads an image")
+    }
+
+    /// What each of its folds needs of workgroup memory.
+    pub(crate) fn folds(&self) -> impl Iterator<Item = Workspace> + '_ {
+        self.stages.iter().filter_map(|s| match s.entry {
+            Entry::Fold(workspace) => Some(workspace),
+            _ => None,
+        })
     }
 
     /// Scalars that drive parameters.

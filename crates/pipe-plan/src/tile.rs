@@ -130,7 +130,7 @@ fn look(pass: &KernelPass, read: usize) -> Look {
                 Reach::Point => Look::Around([0, 0]),
                 // What lies beyond the other edge is never in the window.
                 Reach::Around(x, y) if !wraps(x, y) => Look::Around([x, y]),
-                Reach::Whole if port.once && matches!(pass.grid, Grid::Blocks(_)) => Look::Block([0, 0]),
+                Reach::Whole if port.once && pass.block().is_some() => Look::Block([0, 0]),
                 Reach::Around(..) | Reach::Whole => Look::Whole,
             };
             seen.and(own.through(inner))
@@ -157,6 +157,7 @@ fn tileable(pass: &KernelPass, ops: &Ops) -> Option<[u32; 2]> {
             matches!(ops.shape(pass.writes[0].resource), Shape::Image(_)) && matches!(entry, Entry::Point | Entry::At | Entry::Each)
         }
         Grid::Blocks(_) => matches!(entry, Entry::Each | Entry::Kernel),
+        Grid::Walk(_) => true,
         Grid::Pixels(_) => entry == Entry::Each,
         Grid::Elements(_) | Grid::Groups(_) => false,
     };
@@ -404,9 +405,9 @@ impl Streams {
             halos.entry(write.resource).or_default();
         }
         for (read, id) in pass.reads.iter().enumerate().filter(|(_, id)| self.streamed.contains(id)) {
-            let needed = match (look(pass, read), pass.grid) {
+            let needed = match (look(pass, read), pass.block()) {
                 (Look::Around(reach), _) => made.plus(Halo::around(reach)),
-                (Look::Block(reach), Grid::Blocks(block)) => made.plus(Halo::around(reach)).plus(self.to_blocks(pass, ops, block, step)),
+                (Look::Block(reach), Some(block)) => made.plus(Halo::around(reach)).plus(self.to_blocks(pass, ops, block, step)),
                 (Look::Block(_) | Look::Whole, _) => unreachable!("what is read from anywhere is not streamed"),
             };
             let known = halos.entry(*id).or_default();

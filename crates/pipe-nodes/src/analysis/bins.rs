@@ -1,13 +1,13 @@
 //! Which bin a value falls in, and how many pixels fall in each.
 //!
 //! Bins are exact: the shader compares with the true edge wherever rounding could matter, so that counts equal
-//! those of a computation in double precision. On a GPU every workgroup counts its tile in workgroup memory and
+//! those of a computation in double precision. Every workgroup counts its tile in workgroup memory and
 //! adds that to the table once; a thread that meets the same bin again only lengthens a run, so an image of one
 //! colour is no slower than any other. Tables beyond workgroup memory are counted in place.
 
 use pipe_graph::prelude::*;
 
-use super::reduction::{Walk, grey};
+use super::reduction::{grey, walk};
 use crate::shader;
 
 /// What of a pixel is counted.
@@ -59,28 +59,24 @@ pub(crate) struct Binning {
 /// Most bins that are counted in workgroup memory: 16 KiB.
 const PRIVATE: u32 = 4096;
 
-/// Lanes that count in columns of their own.
-const LANES: u32 = 16;
-
 /// How many pixels fall in each bin: a table of u32.
 pub(crate) fn count(cx: &mut Lowering<'_>, suffix: &str, image: ResourceId, binning: &Binning) -> ResourceId {
-    let size = cx.image_of(image).size;
+    let walk = walk(cx.image_of(image).size, cx.limits().profile);
     let counts = cx.intermediate(suffix, Shape::uints(binning.bins));
     // A lane of a CPU counts in its own column while the columns fit.
-    let columns = cx.limits().profile == Profile::Cpu && binning.bins * LANES <= PRIVATE;
-    let (walk, shader) = match cx.limits().profile {
-        Profile::Gpu => (Walk::tiles(size, [16, 16], [64, 64]), shader!("analysis/histogram")),
-        Profile::Cpu if columns => (Walk::tiles(size, [LANES, 1], [256, 64]), shader!("analysis/histogram_lanes")),
-        Profile::Cpu => (Walk::tiles(size, [64, 1], [256, 64]), shader!("analysis/histogram")),
-    };
+    let columns = binning.bins * walk.lane_count();
+    let columns = (cx.limits().profile == Profile::Cpu && columns <= PRIVATE).then_some(columns);
+    let private = binning.bins <= PRIVATE;
+    let slots = columns.unwrap_or(if private { binning.bins } else { 1 });
     let pass = cx
-        .pass(suffix, shader)
-        .entry(Entry::Kernel)
+        .pass(suffix, if columns.is_some() { shader!("analysis/histogram_lanes") } else { shader!("analysis/histogram") })
+        .entry(Entry::Fold(Workspace { own: 4 * slots, scratch: 0 }))
+        .grid(Grid::Walk(walk))
         .read_once("image", image)
         .write_as("counts", counts, Access::Atomic, None)
-        .constant("PRIVATE", binning.bins <= PRIVATE)
-        .constant("SLOTS", binning.bins.min(PRIVATE));
-    binning.describe(walk.describe(pass)).add();
+        .constant("PRIVATE", private)
+        .constant("SLOTS", slots);
+    binning.describe(pass).add();
     counts
 }
 

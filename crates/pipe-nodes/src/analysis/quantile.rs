@@ -9,7 +9,7 @@
 use pipe_graph::lowering::PassBuilder;
 use pipe_graph::prelude::*;
 
-use super::reduction::{View, Walk};
+use super::reduction::{View, walk};
 use crate::shader;
 
 /// Bits of a digit: 256 counts for each quantile and component, which workgroup memory holds.
@@ -35,15 +35,18 @@ pub(crate) fn quantiles(cx: &mut Lowering<'_>, suffix: &str, image: ResourceId, 
     let mut found = cx.uints(&format!("{suffix}.start"), &vec![0; (4 * targets * components) as usize]);
     for round in 0..32 / DIGIT {
         let counts = cx.intermediate(&format!("{suffix}.counts{round}"), Shape::uints((targets * components) << DIGIT));
+        // In the first round all quantiles ask for the same counts.
+        let sets = if round == 0 { components } else { targets * components };
         let pass = cx
             .pass(&format!("{suffix}.count{round}"), shader!("analysis/quantile_count"))
-            .entry(Entry::Kernel)
+            .entry(Entry::Fold(Workspace { own: sets << (DIGIT + 2), scratch: 0 }))
+            .grid(Grid::Walk(walk))
             .read_once("image", image)
             .read("state", found, Reach::Whole)
             .write_as("counts", counts, Access::Atomic, None)
             .constant("VIEW", view as i32)
             .constant("ROUND", round);
-        add(walk.describe(pass));
+        add(pass);
         let next = cx.intermediate(&format!("{suffix}.digits{round}"), state);
         let pass = cx
             .pass(&format!("{suffix}.digit{round}"), shader!("analysis/quantile_digit"))
@@ -60,12 +63,13 @@ pub(crate) fn quantiles(cx: &mut Lowering<'_>, suffix: &str, image: ResourceId, 
     let above = cx.intermediate(&format!("{suffix}.above"), Shape::uints(targets * components));
     let pass = cx
         .pass(&format!("{suffix}.next"), shader!("analysis/quantile_next"))
-        .entry(Entry::Kernel)
+        .entry(Entry::Fold(Workspace { own: 4 * targets * components, scratch: 0 }))
+        .grid(Grid::Walk(walk))
         .read_once("image", image)
         .read("state", found, Reach::Whole)
         .write_as("above", above, Access::Atomic, None)
         .constant("VIEW", view as i32);
-    add(walk.describe(pass));
+    add(pass);
     let mut outs = Vec::new();
     for target in 0..targets {
         let out = cx.intermediate(&format!("{suffix}.{target}"), Shape::Scalar);
@@ -81,14 +85,6 @@ pub(crate) fn quantiles(cx: &mut Lowering<'_>, suffix: &str, image: ResourceId, 
         outs.push(out);
     }
     outs
-}
-
-/// Groups of 256 threads share counts in workgroup memory, so a tile is large enough to be worth their transfer.
-fn walk(size: [u32; 2], profile: Profile) -> Walk {
-    match profile {
-        Profile::Gpu => Walk::tiles(size, [16, 16], [64, 64]),
-        Profile::Cpu => Walk::tiles(size, [64, 1], [256, 64]),
-    }
 }
 
 /// A fraction in units of 2⁻³²; 1 is the largest there is.

@@ -1,11 +1,11 @@
 //! What a whole image comes to: its mean, its spread, its extent, as scalars that stay on the GPU.
 //!
-//! Two dispatches. The first walks tiles and leaves a few numbers for each, the second combines them in one
-//! workgroup. The order is fixed, so the same device gives the same bits; sums carry what rounding loses, so the
-//! order does not show either. On a GPU a workgroup of 16×16 threads walks a tile of 64×64 pixels or more and ends
-//! in a tree in workgroup memory; on a CPU each of 64 lanes walks its own columns of a tile and no one waits.
-//! Rejected: atomics (no fixed order for floats) and one dispatch whose last workgroup finishes (WebGPU promises
-//! no order between workgroups). NaN and ±infinity take no part in sums and extents.
+//! Two dispatches. The first is a fold: it walks tiles and leaves a few numbers for each, and folds over the same image
+//! share the walk. The second combines them in one workgroup. The order is fixed, so the same device gives the same bits;
+//! sums carry what rounding loses, so the order does not show either. On a GPU a workgroup of 16×16 threads walks a tile
+//! of 64×64 pixels or more and ends in a tree in workgroup memory; on a CPU each of 16 lanes walks its own columns of a
+//! tile and no one waits. Rejected: atomics (no fixed order for floats) and one dispatch whose last workgroup finishes
+//! (WebGPU promises no order between workgroups). NaN and ±infinity take no part in sums and extents.
 
 use pipe_graph::lowering::PassBuilder;
 use pipe_graph::prelude::*;
@@ -46,68 +46,48 @@ pub(crate) fn mean_of(cx: &mut Lowering<'_>, suffix: &str, image: ResourceId, me
         Mean::Arithmetic => (0, 0),
         Mean::Geometric => (1, 1),
     };
-    let sums = Sums { measure, finish, epsilon, centre: None };
-    sums.lower(cx, suffix, image, view)
-}
-
-/// The standard deviation about a mean found before: √(Σ (v − mean)² / n).
-pub(crate) fn deviation(cx: &mut Lowering<'_>, suffix: &str, image: ResourceId, mean: ResourceId, view: View) -> ResourceId {
-    let sums = Sums { measure: 2, finish: 2, epsilon: 0.0, centre: Some(mean) };
+    let sums = Sums { measure, finish, epsilon };
     sums.lower(cx, suffix, image, view)
 }
 
 /// The mean of the squares of every channel.
 pub(crate) fn mean_square(cx: &mut Lowering<'_>, suffix: &str, image: ResourceId) -> ResourceId {
-    let sums = Sums { measure: 2, finish: 0, epsilon: 0.0, centre: None };
+    let sums = Sums { measure: 2, finish: 0, epsilon: 0.0 };
     sums.lower(cx, suffix, image, View::Channels)
 }
 
 /// How many values of each channel are finite, as a float.
 pub(crate) fn finite(cx: &mut Lowering<'_>, suffix: &str, image: ResourceId) -> ResourceId {
-    let sums = Sums { measure: 0, finish: 3, epsilon: 0.0, centre: None };
+    let sums = Sums { measure: 0, finish: 2, epsilon: 0.0 };
     sums.lower(cx, suffix, image, View::Channels)
+}
+
+/// The standard deviation √(Σ (v − mean)² / n), in one walk.
+pub(crate) fn deviation(cx: &mut Lowering<'_>, suffix: &str, image: ResourceId, view: View) -> ResourceId {
+    let partials = Partials { suffix, image, parts: 4 };
+    let partials = partials.walk(cx, shader!("analysis/deviation"), |pass| pass.constant("VIEW", view as i32));
+    let out = cx.intermediate(suffix, Shape::Scalar);
+    total(cx, suffix, shader!("analysis/deviation_total"), partials, &[("out", out)], |pass| pass);
+    out
 }
 
 /// One kind of sum, as the constants of `sum.wgsl` and `sum_total.wgsl`.
 struct Sums {
-    /// 0 the value, 1 its logarithm, 2 its squared distance from the centre.
+    /// 0 the value, 1 its logarithm, 2 its square.
     measure: i32,
-    /// 0 the mean, 1 its exponential, 2 its square root, 3 the number of values.
+    /// 0 the mean, 1 its exponential, 2 the number of values.
     finish: i32,
     epsilon: f32,
-    centre: Option<ResourceId>,
 }
 
 impl Sums {
     fn lower(&self, cx: &mut Lowering<'_>, suffix: &str, image: ResourceId, view: View) -> ResourceId {
-        let walk = Walk::over(cx.image_of(image).size, cx.limits().profile);
-        let tiles = format!("{suffix}.tiles");
-        let partials = cx.intermediate(&tiles, Shape::floats(walk.partials() * 12));
+        let partials = Partials { suffix, image, parts: 3 };
+        let partials = partials.walk(cx, shader!("analysis/sum"), |pass| {
+            pass.constant("VIEW", view as i32).constant("MEASURE", self.measure).param("epsilon", self.epsilon)
+        });
         let out = cx.intermediate(suffix, Shape::Scalar);
-        let tail = match self.centre {
-            Some(_) => "fn centre() -> vec4f { return load_mean(); }",
-            None => "fn centre() -> vec4f { return vec4f(); }",
-        };
-        let pass = cx
-            .pass(&tiles, extended(&shader!("analysis/sum"), tail))
-            .entry(Entry::Kernel)
-            .read_once("image", image)
-            .write("partials", partials)
-            .constant("VIEW", view as i32)
-            .constant("MEASURE", self.measure)
-            .param("epsilon", self.epsilon);
-        let pass = match self.centre {
-            Some(mean) => pass.read("mean", mean, Reach::Whole),
-            None => pass,
-        };
-        walk.describe(pass).add();
-        cx.pass(suffix, shader!("analysis/sum_total"))
-            .entry(Entry::Kernel)
-            .read("partials", partials, Reach::Whole)
-            .write("out", out)
-            .constant("FINISH", self.finish)
-            .grid(Grid::Groups([1, 1, 1]))
-            .add();
+        total(cx, suffix, shader!("analysis/sum_total"), partials, &[("out", out)], |pass| pass.constant("FINISH", self.finish));
         out
     }
 }
@@ -126,82 +106,88 @@ pub(crate) struct Extent {
 
 /// Smallest and largest finite value, and how many values are none.
 pub(crate) fn extent(cx: &mut Lowering<'_>, suffix: &str, image: ResourceId, view: View) -> Extent {
-    let walk = Walk::over(cx.image_of(image).size, cx.limits().profile);
-    let tiles = format!("{suffix}.tiles");
-    let partials = cx.intermediate(&tiles, Shape::floats(walk.partials() * 16));
-    let pass = cx
-        .pass(&tiles, shader!("analysis/extent"))
-        .entry(Entry::Kernel)
-        .read_once("image", image)
-        .write("partials", partials)
-        .constant("VIEW", view as i32);
-    walk.describe(pass).add();
+    let partials = Partials { suffix, image, parts: 4 };
+    let partials = partials.walk(cx, shader!("analysis/extent"), |pass| pass.constant("VIEW", view as i32));
     let mut part = |name: &str| cx.intermediate(&format!("{suffix}.{name}"), Shape::Scalar);
     let extent = Extent { min: part("min"), max: part("max"), nan: part("nan"), inf: part("inf") };
-    cx.pass(suffix, shader!("analysis/extent_total"))
-        .entry(Entry::Kernel)
-        .read("partials", partials, Reach::Whole)
-        .write("smallest", extent.min)
-        .write("largest", extent.max)
-        .write("nan", extent.nan)
-        .write("inf", extent.inf)
-        .grid(Grid::Groups([1, 1, 1]))
-        .add();
+    let outs = [("smallest", extent.min), ("largest", extent.max), ("nan", extent.nan), ("inf", extent.inf)];
+    total(cx, suffix, shader!("analysis/extent_total"), partials, &outs, |pass| pass);
     extent
 }
 
-/// How workgroups walk an image: each takes a tile, each thread the pixels of the tile at a stride of the group.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) struct Walk {
-    lanes: [u32; 2],
-    tile: [u32; 2],
-    groups: [u32; 2],
-    /// Every thread leaves its own numbers, and no thread waits for another.
-    serial: bool,
+/// A fold that leaves `parts` vectors of four floats for each tile, or for each lane of it.
+struct Partials<'s> {
+    suffix: &'s str,
+    image: ResourceId,
+    parts: u32,
 }
 
-impl Walk {
-    /// The walk for an image of this size: on a GPU 64 tiles along a side at most once the image is large, on a
-    /// CPU about 128 tiles.
-    pub(crate) fn over(size: [u32; 2], profile: Profile) -> Self {
-        let tiles = |tile: [u32; 2]| [size[0].div_ceil(tile[0]), size[1].div_ceil(tile[1])];
-        match profile {
-            Profile::Gpu => {
-                let mut side = 64;
-                while tiles([side, side]).iter().product::<u32>() > 4096 {
-                    side *= 2;
-                }
-                Self { lanes: [16, 16], tile: [side, side], groups: tiles([side, side]), serial: false }
+impl Partials<'_> {
+    /// The fold's pass; `with` adds its constants and parameters. Answers the table of what it leaves.
+    fn walk<'a>(
+        &self,
+        cx: &mut Lowering<'a>,
+        shader: Shader,
+        with: impl for<'b> FnOnce(PassBuilder<'b, 'a>) -> PassBuilder<'b, 'a>,
+    ) -> ResourceId {
+        let size = cx.image_of(self.image).size;
+        let profile = cx.limits().profile;
+        let walk = walk(size, profile);
+        let lanes = walk.lane_count();
+        // On a CPU no thread waits for another: each leaves its own numbers.
+        let left = if profile == Profile::Cpu { lanes } else { 1 };
+        let groups: u32 = walk.groups(size).iter().product();
+        let tiles = format!("{}.tiles", self.suffix);
+        let partials = cx.intermediate(&tiles, Shape::floats(groups * left * 4 * self.parts));
+        let scratch = if left < lanes { self.parts * lanes / 2 } else { 0 };
+        let pass = cx
+            .pass(&tiles, shader)
+            .entry(Entry::Fold(Workspace { own: 0, scratch }))
+            .grid(Grid::Walk(walk))
+            .read_once("image", self.image)
+            .write("partials", partials)
+            .constant("LEFT", left as i32);
+        with(pass).add();
+        partials
+    }
+}
+
+/// The pass that combines what a fold leaves, in one workgroup.
+fn total<'a>(
+    cx: &mut Lowering<'a>,
+    suffix: &str,
+    shader: Shader,
+    partials: ResourceId,
+    outs: &[(&str, ResourceId)],
+    with: impl for<'b> FnOnce(PassBuilder<'b, 'a>) -> PassBuilder<'b, 'a>,
+) {
+    let pass = cx.pass(suffix, shader).entry(Entry::Kernel).read("partials", partials, Reach::Whole).grid(Grid::Groups([1, 1, 1]));
+    let pass = outs.iter().fold(pass, |pass, (port, out)| pass.write(port, *out));
+    with(pass).add();
+}
+
+/// Most pixels of a tile's height: images larger than memory pass by in bands of whole tiles.
+const TALLEST: u32 = 128;
+
+/// The walk of all reductions over an image of this size, so that they can share it. Tiles grow with the image, up to
+/// 4096 of them for 16384×16384 pixels.
+pub(crate) fn walk(size: [u32; 2], profile: Profile) -> Walk {
+    match profile {
+        Profile::Gpu => {
+            let mut walk = Walk { lanes: [16, 16], tile: [64, 64] };
+            while walk.groups(size).iter().product::<u32>() > 4096 {
+                let axis = usize::from(walk.tile[1] < TALLEST);
+                walk.tile[axis] *= 2;
             }
-            Profile::Cpu => {
-                let width = size[0].next_multiple_of(64).min(512);
-                let area = u64::from(size[0]) * u64::from(size[1]) / 128;
-                let height = (area / u64::from(width)).clamp(1, 4096) as u32;
-                let tile = [width, height];
-                Self { lanes: [64, 1], tile, groups: tiles(tile), serial: true }
-            }
+            walk
         }
-    }
-
-    /// Tiles of a size given, for workgroups whose threads share their numbers.
-    pub(crate) const fn tiles(size: [u32; 2], lanes: [u32; 2], tile: [u32; 2]) -> Self {
-        Self { lanes, tile, groups: [size[0].div_ceil(tile[0]), size[1].div_ceil(tile[1])], serial: false }
-    }
-
-    /// How many threads or workgroups leave numbers.
-    pub(crate) const fn partials(&self) -> u32 {
-        let groups = self.groups[0] * self.groups[1];
-        if self.serial { groups * self.lanes[0] * self.lanes[1] } else { groups }
-    }
-
-    /// Grid and constants of a kernel that walks so.
-    pub(crate) fn describe<'b, 'a>(&self, pass: PassBuilder<'b, 'a>) -> PassBuilder<'b, 'a> {
-        pass.constant("LANES_X", self.lanes[0] as i32)
-            .constant("LANES_Y", self.lanes[1] as i32)
-            .constant("TILE_X", self.tile[0] as i32)
-            .constant("TILE_Y", self.tile[1] as i32)
-            .constant("SERIAL", self.serial)
-            .grid(Grid::Groups([self.groups[0], self.groups[1], 1]))
+        Profile::Cpu => {
+            // About 128 tiles, but none so small that ending it would take longer than walking it.
+            let width = size[0].next_multiple_of(64).min(512);
+            let area = u64::from(size[0]) * u64::from(size[1]);
+            let pixels = (area / 128).clamp(1 << 14, u64::from(512 * TALLEST)) as u32;
+            Walk { lanes: [16, 1], tile: [width, (pixels / width).min(TALLEST)] }
+        }
     }
 }
 
@@ -247,17 +233,16 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_walk_covers_every_size_with_few_partials() {
+    fn a_walk_covers_every_size_with_few_flat_tiles() {
         for profile in [Profile::Gpu, Profile::Cpu] {
-            for size in [[1, 1], [1, 4096], [61, 47], [3840, 2160], [16384, 16384], [16384, 1]] {
-                let walk = Walk::over(size, profile);
-                for axis in 0..2 {
-                    assert!(walk.groups[axis] * walk.tile[axis] >= size[axis]);
-                    assert!(walk.groups[axis] <= 65535);
-                }
-                assert!(walk.partials() <= 1 << 19, "{size:?}: {walk:?}");
-                let pixels_a_thread = (walk.tile[0] / walk.lanes[0]).max(1) * (walk.tile[1] / walk.lanes[1]).max(1);
-                assert!(pixels_a_thread <= 65535, "{size:?}: {walk:?}");
+            for size in [[1, 1], [1, 4096], [61, 47], [3840, 2160], [16384, 16384], [16384, 1], [1, 16384]] {
+                let walk = walk(size, profile);
+                let groups = walk.groups(size);
+                assert!(walk.tile[1] <= TALLEST && groups.iter().all(|n| *n <= 65535), "{size:?}: {walk:?}");
+                assert!(groups[0] * groups[1] <= 4096, "{size:?}: {walk:?}");
+                assert!((0..2).all(|axis| groups[axis] * walk.tile[axis] >= size[axis] && walk.tile[axis] % walk.lanes[axis] == 0));
+                // llvmpipe ends an invocation after 65535 iterations.
+                assert!(walk.tile[0] * walk.tile[1] / walk.lane_count() <= 65535 / 2, "{size:?}: {walk:?}");
             }
         }
     }

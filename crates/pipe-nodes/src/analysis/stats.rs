@@ -9,8 +9,8 @@ use super::reduction::{self, Mean, View, finite_values, view};
 /// Y = 0.2126 R + 0.7152 G + 0.0722 B (alpha is left out); of an image of one or two channels, its channels.
 ///
 /// NaN and infinite values are counted and left out of everything else. Without any finite value the statistics
-/// are 0. Only what is used is computed: `min`, `max` and the counts take one pass over the image, `mean` one,
-/// `stddev` one more, the percentiles together five.
+/// are 0. Only what is used is computed: the percentiles together take five passes over the image, everything else
+/// one, which other reductions of the image share.
 #[derive(Debug, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(default)]
 pub(crate) struct Stats {
@@ -48,7 +48,7 @@ impl Node for Stats {
         let view = seen(cx.image_of(image).channels);
         let extent = reduction::extent(cx, "extent", image, view);
         let mean = reduction::mean_of(cx, "mean", image, Mean::Arithmetic, 0.0, view);
-        let deviation = reduction::deviation(cx, "stddev", image, mean, view);
+        let deviation = reduction::deviation(cx, "stddev", image, view);
         let found = quantiles(cx, "percentile", image, view, &FRACTIONS.map(|(_, fraction)| fraction));
         cx.emit("min", extent.min);
         cx.emit("max", extent.max);

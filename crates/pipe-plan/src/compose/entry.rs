@@ -9,8 +9,8 @@ use std::fmt::Write as _;
 use pipe_graph::pass::{Entry, Grid, Limits, Profile, ResourceId, Shape};
 use pipe_graph::types::Precision;
 
-use super::layout;
 use super::ports::narrow;
+use super::{layout, walk};
 use crate::PlanError;
 use crate::kernel_pass::{KernelPass, Ops, Source};
 
@@ -43,6 +43,10 @@ impl Cover {
         let position = position(stage.entry, &stage.shader.source, shape);
         let elements = match (pass.grid, shape) {
             (Grid::Groups(groups), _) => groups,
+            (Grid::Walk(walk), _) => {
+                let [x, y] = walk.groups(pass.image_of_fold().image_size());
+                [x, y, 1]
+            }
             (Grid::Elements(n), _) => n,
             (Grid::Blocks(block), _) => {
                 let size = pass.plane(ops).unwrap_or([1, 1]);
@@ -56,7 +60,7 @@ impl Cover {
             (Grid::Cover, Shape::Volume(t)) => t.size,
             (Grid::Cover, _) => [shape.entries(), 1, 1],
         };
-        if matches!(stage.entry, Entry::Points | Entry::Kernel) {
+        if matches!(stage.entry, Entry::Points | Entry::Kernel | Entry::Fold(_)) {
             let cover = Self { elements, size: [1; 3], each: 1, axis: 0, groups: elements, position, tiled };
             return if stage.entry == Entry::Points { Ok(cover) } else { cover.checked(pass, limits) };
         }
@@ -116,7 +120,7 @@ fn position(entry: Entry, source: &str, shape: Shape) -> &'static str {
     })
 }
 
-/// The main module of everything but a `Kernel`.
+/// The main module of everything but a `Kernel` and folds.
 pub(super) fn main_module(pass: &KernelPass, cover: &Cover, ops: &Ops, index: &dyn Fn(ResourceId, bool) -> usize) -> String {
     let main = pass.stages.len() - 1;
     let stage = pass.last();
@@ -130,7 +134,13 @@ pub(super) fn main_module(pass: &KernelPass, cover: &Cover, ops: &Ops, index: &d
         );
     }
     let body = match stage.entry {
-        Entry::Point => point_body(pass, index),
+        Entry::Point => {
+            let mut body = stage_calls(pass, index);
+            for write in &pass.writes {
+                let _ = writeln!(body, "package::io::put_r{}(at, v{});", index(write.resource, true), write.stage);
+            }
+            body
+        }
         Entry::At => {
             let w = index(pass.writes[0].resource, true);
             match ops.shape(pass.writes[0].resource) {
@@ -187,8 +197,9 @@ pub(super) fn main_module(pass: &KernelPass, cover: &Cover, ops: &Ops, index: &d
     text
 }
 
-/// Every stage once, in order, each result in a variable of its own, so that a diamond computes nothing twice.
-fn point_body(pass: &KernelPass, index: &dyn Fn(ResourceId, bool) -> usize) -> String {
+/// Every stage once for the pixel `at`, in order, each result in a variable of its own, so that nothing is computed or loaded
+/// twice.
+pub(super) fn stage_calls(pass: &KernelPass, index: &dyn Fn(ResourceId, bool) -> usize) -> String {
     let mut body = String::from("package::io::current = at;\n");
     let mut loaded: Vec<usize> = Vec::new();
     for (s, stage) in pass.stages.iter().enumerate() {
@@ -206,11 +217,11 @@ fn point_body(pass: &KernelPass, index: &dyn Fn(ResourceId, bool) -> usize) -> S
                 Source::Stage(k) => format!("v{k}"),
             });
         }
-        let call = format!("package::s{s}::apply({})", args.join(", "));
-        let _ = writeln!(body, "let v{s} = {};", narrow(&call, stage.shape));
-    }
-    for write in &pass.writes {
-        let _ = writeln!(body, "package::io::put_r{}(at, v{});", index(write.resource, true), write.stage);
+        let args = args.join(", ");
+        let _ = match stage.entry {
+            Entry::Fold(_) => writeln!(body, "{}", walk::take(s, stage, &args)),
+            _ => writeln!(body, "let v{s} = {};", narrow(&format!("package::s{s}::apply({args})"), stage.shape)),
+        };
     }
     body
 }

@@ -8,13 +8,14 @@
 //!   constants, so the same shader can stand many times in one kernel without renaming by hand,
 //! - `package::main`: the entry point, which covers the grid and calls the last stage.
 //!
-//! A `Kernel` shader has its own entry point; its stage is the main module itself.
+//! A `Kernel` shader has its own entry point; its stage is the main module itself. Folds share one, see `walk`.
 //!
 //! Texts are made first and put together at the end, in parallel, once for each distinct kernel.
 
 mod entry;
 mod layout;
 mod ports;
+mod walk;
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
@@ -125,6 +126,7 @@ impl<'a> Composer<'a> {
             resources.push(pass.writes[0].resource);
         }
         io.push_str("var<private> current: vec2i;\n");
+        walk::declare(&mut io, pass);
 
         // The target of points is not bound and never asked for.
         let index = |id: ResourceId, write: bool| {
@@ -161,6 +163,7 @@ impl<'a> Composer<'a> {
             block.params(&mut text, s, stage, &drivers);
             let size = pass.writes.iter().find(|w| w.stage == s).or(pass.writes.first()).map(|w| index(w.resource, true));
             ports::place(&mut text, size.expect("a pass writes something"), stage);
+            walk::place(&mut text, pass, stage);
             if stage.entry == Entry::Point {
                 ports::point_value(&mut text, s, pass, &index);
             }
@@ -177,7 +180,13 @@ impl<'a> Composer<'a> {
             modules.push((name, text));
         }
         let cover = Cover::new(pass, self.ops, self.limits, windows.is_some())?;
-        if !kernel_entry {
+        if let Grid::Walk(walk) = pass.grid {
+            let size = match pass.image_of_fold().source {
+                Source::Read(r) => ports::Size::Bound(index(pass.reads[r], false)),
+                Source::Stage(producer) => self.size_source(pass, producer, &index),
+            };
+            modules.push(("main".to_owned(), walk::main_module(pass, walk, &size.text(), windows.is_some(), &index)));
+        } else if !kernel_entry {
             modules.push(("main".to_owned(), entry::main_module(pass, &cover, self.ops, &index)));
         }
         let trusted = pass.stages.iter().all(|s| s.shader.trusted);

@@ -23,6 +23,17 @@ pub(super) enum Size {
     Fixed(Shape),
 }
 
+impl Size {
+    /// The expression of an image's size.
+    pub(super) fn text(&self) -> String {
+        match self {
+            Self::Bound(i) => format!("package::io::size_r{i}()"),
+            Self::Fixed(Shape::Image(t)) => format!("vec2i({}, {})", t.size[0], t.size[1]),
+            Self::Fixed(_) => "vec2i(1, 1)".to_owned(),
+        }
+    }
+}
+
 /// The name of a texel format in WGSL.
 fn texel(channels: u8, precision: Precision, limits: &Limits) -> &'static str {
     let half = precision == Precision::F16 && (channels == 4 || limits.half_storage);
@@ -204,14 +215,7 @@ pub(super) fn read_port(text: &mut String, port: &StagePort, raw: Raw) {
             let (vi, vf) = if volume { ("vec3i", "vec3f") } else { ("vec2i", "vec2f") };
             let (size, fetch) = match raw {
                 Raw::Bound(i) => (format!("package::io::size_r{i}()"), format!("package::io::fetch_r{i}(p)")),
-                Raw::Stage { producer, size } => {
-                    let size = match size {
-                        Size::Bound(i) => format!("package::io::size_r{i}()"),
-                        Size::Fixed(Shape::Image(t)) => format!("vec2i({}, {})", t.size[0], t.size[1]),
-                        Size::Fixed(_) => "vec2i(1, 1)".to_owned(),
-                    };
-                    (size, format!("package::s{producer}::value(p)"))
-                }
+                Raw::Stage { producer, size } => (size.text(), format!("package::s{producer}::value(p)")),
             };
             let place = match port.border {
                 Border::Clamp => format!("let p = clamp(xy, {vi}(0), size_{n}() - 1);"),
