@@ -67,16 +67,18 @@ impl Shape {
         match self {
             Self::Image(t) => t.size[0] as u64 * t.size[1] as u64 * t.channels as u64 * t.precision.bytes(),
             Self::Volume(t) => t.size[0] as u64 * t.size[1] as u64 * t.size[2] as u64 * t.channels as u64 * t.precision.bytes(),
-            Self::Table { .. } | Self::Words { .. } | Self::Pixels { .. } => self.entries() as u64 * 4,
+            Self::Table { len, .. } | Self::Words { len } => *len as u64 * 4,
+            Self::Pixels { size, pixel } => (size[0] as u64 * size[1] as u64 * *pixel as u64).next_multiple_of(4),
             Self::Scalar => 16,
         }
     }
 
-    /// Entries of a table or of what is seen as one; 1 of anything else.
+    /// Entries of a table or of what is seen as one; 1 of anything else. No buffer has more than `u32` counts.
     pub const fn entries(&self) -> u32 {
         match self {
             Self::Table { len, .. } | Self::Words { len } => *len,
-            Self::Pixels { size, pixel } => (size[0] as u64 * size[1] as u64 * *pixel as u64).div_ceil(4) as u32,
+            Self::Pixels { .. } if self.bytes() / 4 > u32::MAX as u64 => u32::MAX,
+            Self::Pixels { .. } => (self.bytes() / 4) as u32,
             _ => 1,
         }
     }

@@ -53,7 +53,7 @@ pub(crate) fn plan(name: &str, schedule: &Schedule, limits: &Limits, options: &O
         if candidate.work > MOST_WORK {
             let [w, h] = candidate.step;
             reason = Some(format!(
-                "tiles of {w}x{h}, the largest that fit, would compute {:.1} times the pixels that are wanted, since passes look so far around",
+                "tiles of {w}x{h} would compute {:.1} times the pixels that are wanted, since passes look so far around",
                 candidate.work
             ));
             break;

@@ -1,5 +1,6 @@
 //! Weights of the Gaussian and the passes of a separable convolution.
 
+use pipe_graph::pass::Limits;
 use pipe_graph::prelude::*;
 
 use crate::filters::recursive::recursive_axis;
@@ -119,9 +120,10 @@ pub(super) fn separable(cx: &mut Lowering<'_>, prefix: &str, sigma: [f32; 2], im
 
 /// The radius up to which a convolution is preferred to the recursive filter, whose cost does not depend on σ. On GPUs it is
 /// the faster one up to here. On CPUs the recursive filter is faster from 10 on, and at σ = 8 three times as fast; below
-/// that exactness is worth more than the difference.
-const fn separable_up_to(profile: Profile) -> u32 {
-    match profile {
+/// that exactness is worth more than the difference. In tiles the convolution looks four times less far around.
+const fn separable_up_to(limits: &Limits) -> u32 {
+    match limits.profile {
+        _ if limits.tiled => 96,
         Profile::Gpu => 24,
         Profile::Cpu => 20,
     }
@@ -129,7 +131,7 @@ const fn separable_up_to(profile: Profile) -> u32 {
 
 /// The fastest Gaussian blur of `image` into `out`: along each axis exact while σ is small, recursive beyond.
 pub(super) fn blur(cx: &mut Lowering<'_>, prefix: &str, sigma: [f32; 2], image: ResourceId, out: ResourceId) {
-    let most = separable_up_to(cx.limits().profile);
+    let most = separable_up_to(cx.limits());
     both_axes(cx, prefix, sigma, [image, out], |cx, suffix, axis, sigma, ends| {
         if radius(sigma) <= most {
             exact_axis(cx, suffix, axis, sigma, ends);

@@ -54,7 +54,7 @@ impl Cover {
             }
             (Grid::Pixels(per), _) => {
                 let [w, h] = shape.plane().unwrap_or([1, 1]).map(u64::from);
-                [(w * h).div_ceil(per.into()) as u32, 1, 1]
+                [u32::try_from((w * h).div_ceil(per.into())).unwrap_or(u32::MAX), 1, 1]
             }
             (Grid::Cover, Shape::Image(t)) => [t.size[0], t.size[1], 1],
             (Grid::Cover, Shape::Volume(t)) => t.size,
@@ -80,7 +80,7 @@ impl Cover {
             _ => ([256, 1, 1], if elements[0] >= LONG_TABLE { 4 } else { 1 }, 0),
         };
         let mut cover = Self { elements, size, each, axis, groups: [0; 3], position, tiled };
-        cover.groups = cover.groups_of(elements);
+        cover.groups = cover.groups_for(elements);
         if position == "i32" && cover.groups[0] > limits.max_groups {
             cover.groups[1] = cover.groups[0].div_ceil(limits.max_groups);
             cover.groups[0] = limits.max_groups;
@@ -88,8 +88,14 @@ impl Cover {
         cover.checked(pass, limits)
     }
 
-    /// Workgroups that cover so many elements.
+    /// Workgroups that cover so many elements: a part of the grid, no larger than the whole.
     pub(crate) fn groups_of(&self, elements: [u32; 3]) -> [u32; 3] {
+        let [x, y, z] = self.groups_for(elements);
+        // A long row of groups goes on in the next one.
+        if x > self.groups[0] { [self.groups[0], x.div_ceil(self.groups[0]), z] } else { [x, y, z] }
+    }
+
+    fn groups_for(&self, elements: [u32; 3]) -> [u32; 3] {
         std::array::from_fn(|i| elements[i].div_ceil(self.size[i] * if i == self.axis { self.each } else { 1 }).max(1))
     }
 
