@@ -55,7 +55,7 @@ fn bands(height: u32, band: u32, overlap: u32) -> impl Iterator<Item = Range<u32
 /// Reads a file by bands of every height, twice from the top, and compares with what `read` gives.
 fn compare(source: &Source, options: &ReadOptions) {
     let whole = read(source, options).unwrap();
-    for (height, overlap) in BANDS.into_iter().flat_map(|height| [0, 2, 19, 70].map(|overlap| (height, overlap))) {
+    for (height, overlap) in [(1, 0), (1, 2), (7, 19), (16, 0), (16, 2), (33, 70), (u32::MAX, 0)] {
         let mut reader = RowReader::open(source, options).unwrap();
         let header = reader.header();
         assert_eq!(
