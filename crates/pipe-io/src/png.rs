@@ -270,8 +270,9 @@ fn tag<W: Write>(encoder: &mut png::Encoder<'_, W>, colour: &Colour) {
     });
 }
 
-/// A file whose rows are being written. Compressed data is gathered into chunks of some megabytes; a picture that fits
-/// in one becomes the same file that [`encode`] makes.
+/// A file whose rows are being written. Filters and compression are those of [`encode`], but the compressed stream is
+/// put together otherwise (and cannot be given up for an uncompressed one in the end, as that of noise is there), so
+/// the pixels are the same and the bytes are not.
 pub(crate) struct RowEncoder<W: Write + 'static> {
     writer: png::StreamWriter<'static, W>,
     wide: bool,
@@ -280,7 +281,7 @@ pub(crate) struct RowEncoder<W: Write + 'static> {
 impl<W: Write + 'static> RowEncoder<W> {
     /// Begins a file for a picture like this one, whose bytes are not looked at.
     pub(crate) fn begin(out: W, like: &Picture, compression: Compression, tag_colour: bool) -> Result<Self, Fault> {
-        const CHUNK: usize = 4 << 20;
+        const CHUNK: usize = 1 << 20;
         let writer = encoder(out, like, compression, tag_colour).write_header().map_err(failure)?;
         Ok(Self { writer: writer.into_stream_writer_with_size(CHUNK).map_err(failure)?, wide: like.sample == Sample::U16 })
     }

@@ -47,16 +47,20 @@ pub(crate) struct Strips<W> {
 impl<W: Write + Seek> Strips<W> {
     /// Begins a file for a picture like this one, whose bytes are not looked at.
     pub(crate) fn begin(out: W, like: &Picture, compression: Compression) -> Result<Self, Fault> {
+        let raw = like.width as u64 * u64::from(like.height) * (like.channels.count() * like.sample.bytes()) as u64;
+        // LZW makes noise half as large again; 16 bytes are a strip's entries in the directory.
+        let most = raw + raw / 2 + u64::from(like.height) * 16 + 4096;
+        Self::begin_as(most > u64::from(u32::MAX), out, like, compression)
+    }
+
+    /// The same, as a BigTIFF or not.
+    fn begin_as(big: bool, out: W, like: &Picture, compression: Compression) -> Result<Self, Fault> {
         if like.sample == Sample::F16 {
             return Err(Fault::Form("TIFF holds u8, u16 or float, not half".to_owned()));
         }
         let row = like.width as usize * like.channels.count() * like.sample.bytes();
         // Runs of PackBits end with their row.
         let rows_per_strip = if compression == Compression::Packbits { 1 } else { STRIP.div_ceil(row) };
-        let raw = row as u64 * u64::from(like.height);
-        // LZW makes noise half as large again; 16 bytes are a strip's entries in the directory.
-        let most = raw + raw / 2 + u64::from(like.height) * 16 + 4096;
-        let big = most > u64::from(u32::MAX);
         let like = Picture { bytes: Vec::new(), metadata: crate::picture::Metadata::default(), ..*like };
         let strip = row * rows_per_strip;
         let mut strips = Self { out, like, compression, big, rows_per_strip, strip, pending: Vec::new(), places: Vec::new(), at: 0 };
@@ -206,4 +210,41 @@ fn compress(strip: &[u8], compression: Compression) -> Result<Vec<u8>, Fault> {
     }
     .map_err(Fault::Io)?;
     Ok(packed)
+}
+
+#[cfg(test)]
+mod tests {
+    use std::io::Cursor;
+
+    use super::*;
+    use crate::colour::Colour;
+    use crate::picture::{Channels, Layout, Metadata};
+    use crate::source::Limits;
+
+    #[test]
+    fn a_big_tiff_holds_the_same() {
+        let picture = Picture {
+            width: 900,
+            height: 1300,
+            sample: Sample::U16,
+            layout: Layout::Interleaved,
+            channels: Channels::Ya,
+            alpha: Alpha::Straight,
+            colour: Colour::SRGB,
+            bytes: (0..900 * 1300 * 4).map(|i: u32| (i.wrapping_mul(i) >> 13) as u8).collect(),
+            metadata: Metadata::default(),
+        };
+        for compression in [Compression::None, Compression::Lzw, Compression::Deflate, Compression::Packbits] {
+            for big in [false, true] {
+                let mut strips = Strips::begin_as(big, Cursor::new(Vec::new()), &picture, compression).unwrap();
+                for band in picture.bytes.chunks(900 * 4 * 111) {
+                    strips.write(band).unwrap();
+                }
+                let file = strips.finish().unwrap().into_inner();
+                assert_eq!(file[2], if big { 43 } else { 42 });
+                let back = crate::tiff::decode(&file, &Limits::default(), true).unwrap();
+                assert!(back.bytes == picture.bytes && back.alpha == Alpha::Straight, "{compression:?}, big: {big}");
+            }
+        }
+    }
 }
