@@ -62,8 +62,15 @@ pub(super) fn main_module(pass: &KernelPass, walk: Walk, size: &str, index: &dyn
         folds.map(|(s, _)| format!("    package::s{s}::{function}();\n")).collect()
     };
     let (begin, end, settle) = (each("begin", &|_| true), each("end", &|_| true), each("settle", &settles));
-    let body = stage_calls(pass, index);
     let ([lx, ly], [tx, ty]) = (walk.lanes, walk.tile);
+    let body = stage_calls(pass, index);
+    let next = format!("at.x += {lx};\nif at.x >= last.x {{ at = vec2i(start.x, at.y + {ly}); }}\n");
+    let pixels = if settle.is_empty() {
+        format!("    while at.y < last.y {{\n{body}{next}    }}\n")
+    } else {
+        let quick = format!("    while at.y < last.y {{\nvar doubt = false;\n{body}{next}if doubt {{ break; }}\n    }}\n");
+        format!("    while at.y < last.y {{\n{quick}{settle}    }}\n")
+    };
     format!(
         "@compute @workgroup_size({lx}, {ly}, 1)\n\
          fn main(\n    @builtin(workgroup_id) group: vec3u,\n    @builtin(local_invocation_id) local: vec3u,\n\
@@ -76,12 +83,7 @@ pub(super) fn main_module(pass: &KernelPass, walk: Walk, size: &str, index: &dyn
          {begin}\
          \x20   let start = first + vec2i(local.xy);\n\
          \x20   var at = vec2i(start.x, select(last.y, start.y, start.x < last.x));\n\
-         \x20   while at.y < last.y {{\n\
-         \x20   var doubt = false;\n\
-         \x20   while at.y < last.y && !doubt {{\n{body}\
-         \x20   at.x += {lx};\n\
-         \x20   if at.x >= last.x {{ at = vec2i(start.x, at.y + {ly}); }}\n\
-         \x20   }}\n{settle}    }}\n{end}}}\n",
+         {pixels}{end}}}\n",
         tx - 1,
     )
 }
