@@ -143,9 +143,10 @@ fn statistics_are_those_of_numpy() {
 /// comes first.
 #[test]
 fn deviations_are_right_far_from_zero() {
+    type Value<'a> = &'a dyn Fn(i64, i64) -> f64;
     let mut bench = Bench::new();
     let wave = |x: i64, y: i64| 2.0 * hash(1, (4096 * y + x) as u64) - 1.0;
-    let images: [(&str, f64, &dyn Fn(i64, i64) -> f64); 5] = [
+    let images: [(&str, f64, Value<'_>); 5] = [
         ("1e4 ± 1", 2e-7, &|x, y| 1e4 + wave(x, y)),
         ("-1e6 ± 10", 2e-7, &|x, y| -1e6 + 10.0 * wave(x, y)),
         ("1e-3 ± 1e-6", 2e-7, &|x, y| 1e-3 + 1e-6 * wave(x, y)),

@@ -6,7 +6,8 @@ use std::cell::RefCell;
 use pipe_graph::graph::Graph;
 use pipe_graph::pass::{Limits, Profile};
 use pipe_graph::reference::Tensor;
-use pipe_plan::{Options, Plan};
+use pipe_plan::lower::{Rim, lower};
+use pipe_plan::{Options, Phase, Plan};
 use pipe_tests::bench::{Bench, compile, plan, reference};
 use pipe_tests::source::{edge, edge_type};
 use proptest::prelude::*;
@@ -167,6 +168,26 @@ fn reductions_of_one_image_read_it_once() {
             assert_eq!(readers(false), 6, "{size:?} {profile:?}");
         }
     }
+}
+
+/// Three histograms of a CPU take 16 KiB each; the planner says so and leaves them apart.
+#[test]
+fn reductions_that_do_not_fit_together_stay_apart() {
+    let channel = |c: &str| format!(r#""{c}": Histogram(image: "in", channel: {c})"#);
+    let text = format!(
+        r#"Graph(version: 1, inputs: {{"in": Image}}, nodes: {{{}, {}}}, outputs: {{"r": "R", "g": "G"}})"#,
+        channel("R"),
+        channel("G")
+    );
+    let graph = compile(&text, &[("in", edge_type("in", SIZE))]).unwrap_or_else(|e| panic!("{e}"));
+    let told = |profile| {
+        let limits = Limits { profile, ..Limits::default() };
+        let passes = lower(&graph, &Rim::default(), &limits).unwrap_or_else(|e| panic!("{e}"));
+        pipe_plan::after(passes, Phase::Fuse, true, &limits)
+    };
+    assert!(told(Profile::Gpu).contains("G.counts and R.counts share one read"));
+    let apart = "G.counts and R.counts each read the same image: together they take more workgroup memory than devices have";
+    assert!(told(Profile::Cpu).contains(apart), "{}", told(Profile::Cpu));
 }
 
 /// The order of a lane's pixels does not depend on company, so neither does any bit.

@@ -7,7 +7,9 @@
 //!
 //! Tiles stand at multiples of their size: group row g reads the rows from g times the tile's height on and no others.
 
-use pipe_graph::pass::{Entry, ResourceId, Walk};
+use std::fmt::Write as _;
+
+use pipe_graph::pass::{Entry, Grid, ResourceId, Walk};
 
 use super::entry::stage_calls;
 use super::layout;
@@ -18,26 +20,27 @@ pub(super) fn declare(io: &mut String, pass: &KernelPass) {
     let Some(scratch) = pass.folds().map(|w| w.scratch).max() else { return };
     io.push_str("var<private> lane: i32;\nvar<private> group: i32;\n");
     if scratch > 0 {
-        io.push_str(&format!("var<workgroup> scratch: array<vec4f, {scratch}>;\n"));
+        let _ = writeln!(io, "var<workgroup> scratch: array<vec4f, {scratch}>;");
     }
 }
 
 /// `LANES`, `lane()`, `group()` and the scratch of a fold.
 pub(super) fn place(text: &mut String, pass: &KernelPass, stage: &Stage) {
-    let (Entry::Fold(workspace), pipe_graph::pass::Grid::Walk(walk)) = (stage.entry, pass.grid) else { return };
+    let (Entry::Fold(workspace), Grid::Walk(walk)) = (stage.entry, pass.grid) else { return };
     let (store, load) = match workspace.scratch {
         // Where every lane leaves its own numbers, nothing is shared.
         0 => ("", "vec4f()"),
         _ => ("package::io::scratch[i] = v;", "package::io::scratch[i]"),
     };
-    text.push_str(&format!(
+    let _ = write!(
+        text,
         "const LANES: i32 = {};\n\
          fn lane() -> i32 {{ return package::io::lane; }}\n\
          fn group() -> i32 {{ return package::io::group; }}\n\
          fn scratch_store(i: i32, v: vec4f) {{ {store} }}\n\
          fn scratch_load(i: i32) -> vec4f {{ return {load}; }}\n",
         walk.lane_count()
-    ));
+    );
 }
 
 /// Whether a fold's `take` may ask for more: its `settle` is called outside of the loop over pixels, for the rare ones that
@@ -48,10 +51,8 @@ fn settles(stage: &Stage) -> bool {
 
 /// Hands the pixel `at` to a fold.
 pub(super) fn take(s: usize, stage: &Stage, v: &str) -> String {
-    match settles(stage) {
-        true => format!("doubt = package::s{s}::take(at, {v}) || doubt;"),
-        false => format!("package::s{s}::take(at, {v});"),
-    }
+    let call = format!("package::s{s}::take(at, {v})");
+    if settles(stage) { format!("doubt = {call} || doubt;") } else { format!("{call};") }
 }
 
 /// The entry point of the folds of a pass, over an image whose size this expression says.
