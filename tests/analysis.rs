@@ -2,10 +2,12 @@
 
 use std::path::PathBuf;
 
+use pipe_graph::pass::{Limits, Profile};
 use pipe_graph::reference::{Raster, Tensor};
 use pipe_graph::types::EdgeType;
 use pipe_io::{ReadOptions, Source};
-use pipe_tests::bench::{Bench, Values, compile};
+use pipe_plan::Options;
+use pipe_tests::bench::{Bench, Values, compile, plan};
 use pipe_tests::source::hash;
 use serde::Deserialize;
 
@@ -133,6 +135,44 @@ fn statistics_are_those_of_numpy() {
         for (name, expected) in pairs {
             let value = got[*name][0];
             assert!((value - expected).abs() <= 1e-5 * expected.abs().max(1e-3), "{} of {}: {value}, expected {expected}", name, s.image);
+        }
+    }
+}
+
+/// Sums of squares would leave nothing of these: values far from zero and close together, and one far from all others that
+/// comes first.
+#[test]
+fn deviations_are_right_far_from_zero() {
+    type Value<'a> = &'a dyn Fn(i64, i64) -> f64;
+    let mut bench = Bench::new();
+    let wave = |x: i64, y: i64| 2.0 * hash(1, (4096 * y + x) as u64) - 1.0;
+    let images: [(&str, f64, Value<'_>); 5] = [
+        ("1e4 ± 1", 2e-7, &|x, y| 1e4 + wave(x, y)),
+        ("-1e6 ± 10", 2e-7, &|x, y| -1e6 + 10.0 * wave(x, y)),
+        ("1e-3 ± 1e-6", 2e-7, &|x, y| 1e-3 + 1e-6 * wave(x, y)),
+        ("a bright pixel first", 4e-6, &|x, y| if x + y == 0 { 1e4 } else { wave(x, y) }),
+        ("a constant", 2e-7, &|_, _| 12_345.678),
+    ];
+    for (what, tolerance, value) in images {
+        for size in [[1, 1], [61, 47], [1031, 517]] {
+            let image = Raster::from_fn(size, 1, |x, y| [f64::from(value(x, y) as f32); 4]);
+            let values: Vec<f64> = image.pixels.iter().map(|p| p[0]).collect();
+            let n = values.len() as f64;
+            let mean = values.iter().sum::<f64>() / n;
+            let expected = (values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / n).sqrt();
+            let text =
+                r#"Graph(version: 1, inputs: {"in": Image}, nodes: {"s": Stats(image: "in")}, outputs: {"s": "s.stddev", "m": "s.mean"})"#;
+            let graph = compile(text, &[("in", EdgeType::image(size, 1))]).unwrap_or_else(|e| panic!("{e}"));
+            for profile in [Profile::Gpu, Profile::Cpu] {
+                let plan = plan(&graph, &Limits { profile, ..bench.limits() }, &Options::default()).unwrap_or_else(|e| panic!("{e}"));
+                let got = bench.run(&graph, plan, &|_| Tensor::Image(image.clone())).unwrap_or_else(|e| panic!("{e}"));
+                let (deviation, m) = (got["s"][0], got["m"][0]);
+                assert!(
+                    (deviation - expected).abs() <= tolerance * expected,
+                    "{what} at {size:?}, {profile:?}: {deviation}, expected {expected}"
+                );
+                assert!((m - mean).abs() <= 1e-7 * mean.abs() + 1e-9, "{what} at {size:?}, {profile:?}: the mean is {m}, not {mean}");
+            }
         }
     }
 }

@@ -93,7 +93,34 @@ fn every_variant(bench: &mut Bench, kind: &Kind, example: &str) -> Result<(), St
     // Kernels for the other kind of machine are right on this one too.
     let profile = if limits.profile == Profile::Gpu { Profile::Cpu } else { Profile::Gpu };
     one(bench, &Limits { profile, ..limits }, kind, example, SIZES[4], "")?;
+    in_tiles(bench, kind, example)?;
     reach_is_true(bench, kind, example)
+}
+
+/// Made tile by tile, whatever of it can be, the outputs are those of the same passes over whole images, to the bit: a
+/// reach that were not true would show at the seams.
+fn in_tiles(bench: &mut Bench, kind: &Kind, example: &str) -> Result<(), String> {
+    let size = [61, 47];
+    let types: Vec<(&str, EdgeType)> = named(example).map(|n| (n, edge_type(n, size))).collect();
+    let ports: Vec<String> = kind.ports.iter().map(|p| p.0.to_owned()).collect();
+    let graph = compile(&graph_text(kind, example, "", &ports), &types)?;
+    let limits = Limits { tiled: true, ..bench.limits() };
+    let tile = Some([19, 14]);
+    let parts = plan(&graph, &limits, &Options { tile, ..Options::default() })?;
+    if parts.tilings().next().is_none() {
+        return Ok(());
+    }
+    let input = |name: &str| edge(name, size);
+    let whole = plan(&graph, &limits, &Options::default())?;
+    let (whole, parts) = (bench.run(&graph, whole, &input)?, bench.run(&graph, parts, &input)?);
+    for port in &ports {
+        let (Some(whole), Some(parts)) = (whole.get(port), parts.get(port)) else { continue };
+        let differs = whole.iter().zip(parts).position(|(a, b)| a.to_bits() != b.to_bits());
+        if let Some(i) = differs {
+            return Err(format!("`{port}`[{i}] is {} whole and {} in tiles of {tile:?}", whole[i], parts[i]));
+        }
+    }
+    Ok(())
 }
 
 /// Pixels of the inputs outside the declared reach are changed: the pixel in the middle must stay, to the bit.

@@ -6,7 +6,8 @@ use std::cell::RefCell;
 use pipe_graph::graph::Graph;
 use pipe_graph::pass::{Limits, Profile};
 use pipe_graph::reference::Tensor;
-use pipe_plan::{Options, Plan};
+use pipe_plan::lower::{Rim, lower};
+use pipe_plan::{Options, Phase, Plan};
 use pipe_tests::bench::{Bench, compile, plan, reference};
 use pipe_tests::source::{edge, edge_type};
 use proptest::prelude::*;
@@ -124,6 +125,91 @@ fn every_plan_gives_what_the_graph_means() {
         Ok(())
     });
     outcome.unwrap_or_else(|e| panic!("{e}"));
+}
+
+/// Reductions of one image, of what is made of it pixel by pixel, and one that lies behind another.
+const REDUCTIONS: &str = r#"Graph(version: 1, inputs: {"in": Image}, nodes: {
+        "lit": Exposure(image: "in", ev: 0.3),
+        "luma": Luminance(image: "lit"),
+        "stats": Stats(image: "lit"),
+        "histogram": Histogram(image: "lit", range: (-1, 2)),
+        "average": PyramidAverage(image: "lit"),
+        "grey": PyramidAverage(image: "luma", mean: Geometric),
+        "stretched": Normalize(image: "lit"),
+    }, outputs: {"min": "stats.min", "max": "stats.max", "mean": "stats.mean", "stddev": "stats.stddev", "nan": "stats.nan_count",
+        "inf": "stats.inf_count", "median": "stats.median", "counts": "histogram", "average": "average", "grey": "grey",
+        "stretched": "stretched"})"#;
+
+/// The same without percentiles, which need several walks by nature.
+const ONE_WALK: &str = r#"Graph(version: 1, inputs: {"in": Image}, nodes: {
+        "stats": Stats(image: "in"), "histogram": Histogram(image: "in"), "average": PyramidAverage(image: "in"),
+    }, outputs: {"min": "stats.min", "max": "stats.max", "mean": "stats.mean", "stddev": "stats.stddev", "nan": "stats.nan_count",
+        "inf": "stats.inf_count", "counts": "histogram", "average": "average"})"#;
+
+#[test]
+fn reductions_of_one_image_read_it_once() {
+    for size in [[1, 1], [61, 47], [4096, 4096], [10000, 10000]] {
+        let graph = compile(ONE_WALK, &[("in", edge_type("in", size))]).unwrap_or_else(|e| panic!("{e}"));
+        for profile in [Profile::Gpu, Profile::Cpu] {
+            let limits = Limits { profile, ..Limits::default() };
+            // Passes over the image, or over the words of its file.
+            let readers = |fuse| {
+                let plan = planned(&graph, &limits, fuse).to_json();
+                let passes = plan["passes"].as_array().cloned().unwrap_or_default();
+                passes
+                    .into_iter()
+                    .filter(|p| {
+                        p["reads"].as_array().is_some_and(|r| r.iter().any(|name| name.as_str().is_some_and(|n| n.starts_with("in"))))
+                    })
+                    .count()
+            };
+            assert_eq!(readers(true), 1, "{size:?} {profile:?}");
+            // Decoding the file, and five reductions.
+            assert_eq!(readers(false), 6, "{size:?} {profile:?}");
+        }
+    }
+}
+
+/// Three histograms of a CPU take 16 KiB each; the planner says so and leaves them apart.
+#[test]
+fn reductions_that_do_not_fit_together_stay_apart() {
+    let channel = |c: &str| format!(r#""{c}": Histogram(image: "in", channel: {c})"#);
+    let text = format!(
+        r#"Graph(version: 1, inputs: {{"in": Image}}, nodes: {{{}, {}}}, outputs: {{"r": "R", "g": "G"}})"#,
+        channel("R"),
+        channel("G")
+    );
+    let graph = compile(&text, &[("in", edge_type("in", SIZE))]).unwrap_or_else(|e| panic!("{e}"));
+    let told = |profile| {
+        let limits = Limits { profile, ..Limits::default() };
+        let passes = lower(&graph, &Rim::default(), &limits).unwrap_or_else(|e| panic!("{e}"));
+        pipe_plan::after(passes, Phase::Fuse, true, &limits)
+    };
+    assert!(told(Profile::Gpu).contains("G.counts and R.counts share one read"));
+    let apart = "G.counts and R.counts each read the same image: together they take more workgroup memory than devices have";
+    assert!(told(Profile::Cpu).contains(apart), "{}", told(Profile::Cpu));
+}
+
+/// The order of a lane's pixels does not depend on company, so neither does any bit.
+#[test]
+fn reductions_that_share_a_walk_give_the_same_bits() {
+    let mut bench = Bench::new();
+    for text in [REDUCTIONS, ONE_WALK] {
+        for size in [[61, 47], [257, 129], [1, 1]] {
+            let graph = compile(text, &[("in", edge_type("in", size))]).unwrap_or_else(|e| panic!("{e}"));
+            for profile in [Profile::Gpu, Profile::Cpu] {
+                let limits = Limits { profile, ..bench.limits() };
+                let [fused, alone] = [true, false].map(|fuse| {
+                    let plan = planned(&graph, &limits, fuse);
+                    bench.run(&graph, plan, &|name| edge(name, size)).unwrap_or_else(|e| panic!("{e}"))
+                });
+                for (name, values) in &fused {
+                    let bits = |values: &[f64]| values.iter().map(|v| v.to_bits()).collect::<Vec<_>>();
+                    assert_eq!(bits(values), bits(&alone[name]), "{name} at {size:?}, {profile:?}");
+                }
+            }
+        }
+    }
 }
 
 /// 500 nodes are planned in the time of a blink; the bound is generous, the figure stands in docs/performance.md.

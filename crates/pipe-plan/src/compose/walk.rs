@@ -7,7 +7,9 @@
 //!
 //! Tiles stand at multiples of their size: group row g reads the rows from g times the tile's height on and no others.
 
-use pipe_graph::pass::{Entry, ResourceId, Walk};
+use std::fmt::Write as _;
+
+use pipe_graph::pass::{Entry, Grid, ResourceId, Walk};
 
 use super::entry::stage_calls;
 use super::layout;
@@ -18,26 +20,27 @@ pub(super) fn declare(io: &mut String, pass: &KernelPass) {
     let Some(scratch) = pass.folds().map(|w| w.scratch).max() else { return };
     io.push_str("var<private> lane: i32;\nvar<private> group: i32;\n");
     if scratch > 0 {
-        io.push_str(&format!("var<workgroup> scratch: array<vec4f, {scratch}>;\n"));
+        let _ = writeln!(io, "var<workgroup> scratch: array<vec4f, {scratch}>;");
     }
 }
 
 /// `LANES`, `lane()`, `group()` and the scratch of a fold.
 pub(super) fn place(text: &mut String, pass: &KernelPass, stage: &Stage) {
-    let (Entry::Fold(workspace), pipe_graph::pass::Grid::Walk(walk)) = (stage.entry, pass.grid) else { return };
+    let (Entry::Fold(workspace), Grid::Walk(walk)) = (stage.entry, pass.grid) else { return };
     let (store, load) = match workspace.scratch {
         // Where every lane leaves its own numbers, nothing is shared.
         0 => ("", "vec4f()"),
         _ => ("package::io::scratch[i] = v;", "package::io::scratch[i]"),
     };
-    text.push_str(&format!(
+    let _ = write!(
+        text,
         "const LANES: i32 = {};\n\
          fn lane() -> i32 {{ return package::io::lane; }}\n\
          fn group() -> i32 {{ return package::io::group; }}\n\
          fn scratch_store(i: i32, v: vec4f) {{ {store} }}\n\
          fn scratch_load(i: i32) -> vec4f {{ return {load}; }}\n",
         walk.lane_count()
-    ));
+    );
 }
 
 /// Whether a fold's `take` may ask for more: its `settle` is called outside of the loop over pixels, for the rare ones that
@@ -48,10 +51,8 @@ fn settles(stage: &Stage) -> bool {
 
 /// Hands the pixel `at` to a fold.
 pub(super) fn take(s: usize, stage: &Stage, v: &str) -> String {
-    match settles(stage) {
-        true => format!("doubt = package::s{s}::take(at, {v}) || doubt;"),
-        false => format!("package::s{s}::take(at, {v});"),
-    }
+    let call = format!("package::s{s}::take(at, {v})");
+    if settles(stage) { format!("doubt = {call} || doubt;") } else { format!("{call};") }
 }
 
 /// The entry point of the folds of a pass, over an image whose size this expression says; of a tile, from the
@@ -63,9 +64,16 @@ pub(super) fn main_module(pass: &KernelPass, walk: Walk, size: &str, tiled: bool
         folds.map(|(s, _)| format!("    package::s{s}::{function}();\n")).collect()
     };
     let (begin, end, settle) = (each("begin", &|_| true), each("end", &|_| true), each("settle", &settles));
-    let body = stage_calls(pass, index);
     let ([lx, ly], [tx, ty]) = (walk.lanes, walk.tile);
     let offset = if tiled { "package::io::uniforms.grid_first + " } else { "" };
+    let body = stage_calls(pass, index);
+    let next = format!("at.x += {lx};\nif at.x >= last.x {{ at = vec2i(start.x, at.y + {ly}); }}\n");
+    let pixels = if settle.is_empty() {
+        format!("    while at.y < last.y {{\n{body}{next}    }}\n")
+    } else {
+        let quick = format!("    while at.y < last.y {{\nvar doubt = false;\n{body}{next}if doubt {{ break; }}\n    }}\n");
+        format!("    while at.y < last.y {{\n{quick}{settle}    }}\n")
+    };
     format!(
         "@compute @workgroup_size({lx}, {ly}, 1)\n\
          fn main(\n    @builtin(workgroup_id) group: vec3u,\n    @builtin(local_invocation_id) local: vec3u,\n\
@@ -79,12 +87,7 @@ pub(super) fn main_module(pass: &KernelPass, walk: Walk, size: &str, tiled: bool
          {begin}\
          \x20   let start = first + vec2i(local.xy);\n\
          \x20   var at = vec2i(start.x, select(last.y, start.y, start.x < last.x));\n\
-         \x20   while at.y < last.y {{\n\
-         \x20   var doubt = false;\n\
-         \x20   while at.y < last.y && !doubt {{\n{body}\
-         \x20   at.x += {lx};\n\
-         \x20   if at.x >= last.x {{ at = vec2i(start.x, at.y + {ly}); }}\n\
-         \x20   }}\n{settle}    }}\n{end}}}\n",
+         {pixels}{end}}}\n",
         tx - 1,
     )
 }
