@@ -55,5 +55,5 @@ pub use self::form::{Compression, Form, WriteOptions, output_form};
 pub use self::input::{Input, ReadOptions, probe, read};
 pub use self::output::{encode, write};
 pub use self::picture::{Alpha, Channels, Header, Layout, Metadata, Picture, Sample, Window};
-pub use self::rows::{RowReader, RowWriter};
+pub use self::rows::{ReadAhead, RowReader, RowWriter, WriteBehind};
 pub use self::source::{Format, Limits, Source, Target};

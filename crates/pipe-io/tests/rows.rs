@@ -172,6 +172,55 @@ fn a_picture_beyond_the_limits_is_read_by_bands() {
 }
 
 #[test]
+fn a_thread_ahead_and_one_behind_change_nothing() {
+    let folder = tempfile::tempdir().unwrap();
+    for format in [Format::Exr, Format::Png, Format::Jpeg] {
+        let path = folder.path().join("picture");
+        let target = Target { path: Some(path.clone()), format };
+        let whole = picture(format, HEIGHT, &WriteOptions::default());
+        let mut writer = RowWriter::create(&target, &whole, &WriteOptions::default()).unwrap().behind();
+        for rows in bands(HEIGHT, 16, 0) {
+            writer.write(cut(&whole, &rows)).unwrap();
+        }
+        writer.finish().unwrap();
+
+        let expected = read(&Source::file(&path), &ReadOptions::default()).unwrap();
+        let wanted: Vec<_> = bands(HEIGHT, 16, 5).collect();
+        let mut ahead = RowReader::open(&Source::file(&path), &ReadOptions::default()).unwrap().ahead(wanted.clone());
+        for rows in wanted {
+            let band = ahead.next().unwrap().unwrap();
+            assert!(band == cut(&expected, &rows), "{format:?}, rows {rows:?}");
+            ahead.reuse(band);
+        }
+        assert!(ahead.next().is_none());
+        // Nobody need ask for everything.
+        drop(RowReader::open(&Source::file(&path), &ReadOptions::default()).unwrap().ahead(vec![0..9, 9..20, 20..30]));
+    }
+}
+
+#[test]
+fn errors_come_from_the_threads() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("picture.exr");
+    let target = Target { path: Some(path.clone()), format: Format::Exr };
+    let whole = picture(Format::Exr, HEIGHT, &WriteOptions::default());
+    let begin = || RowWriter::create(&target, &whole, &WriteOptions::default()).unwrap().behind();
+    let mut writer = begin();
+    // The second band tells what was wrong with the first, and the end that something was.
+    let odd = (0..3).map(|_| writer.write(vec![0; 5])).find_map(Result::err).unwrap().to_string();
+    assert!(odd.contains("5 bytes are not some of"), "{odd}");
+    assert!(writer.finish().unwrap_err().to_string().contains("an earlier band"));
+    assert!(begin().finish().unwrap_err().to_string().contains("it was to have"));
+    assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0);
+
+    let bytes = encode(&target, &whole, &WriteOptions::default()).unwrap();
+    std::fs::write(&path, &bytes[..bytes.len() - 1]).unwrap();
+    let all: Vec<_> = bands(HEIGHT, 16, 0).collect();
+    let outcomes: Vec<_> = RowReader::open(&Source::file(&path), &ReadOptions::default()).unwrap().ahead(all).collect();
+    assert!(outcomes.len() > 2 && outcomes.last().unwrap().is_err() && outcomes[..outcomes.len() - 1].iter().all(Result::is_ok));
+}
+
+#[test]
 fn what_cannot_be_written_by_rows_names_what_can() {
     let target = Target { path: None, format: Format::Jpeg };
     let form = output_form(&target, &WriteOptions::default(), None).unwrap();
