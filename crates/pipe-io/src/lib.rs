@@ -17,6 +17,8 @@
 //! # Ok::<(), pipe_io::Error>(())
 //! ```
 //!
+//! Pictures that are larger than memory are read and written by bands of rows: [`RowReader`], [`RowWriter`].
+//!
 //! Files are hostile until proven otherwise: declared sizes are checked against [`Limits`] and the file's length
 //! before anything of that size is allocated, and every failure is an [`Error`] that names the file.
 
