@@ -144,7 +144,7 @@ impl Error {
 
 /// What to do about a file that is too large.
 pub(crate) const RAISE: &str = "raise the limit if this is meant";
-const BY_ROWS: &str = "read it by bands of rows, or raise the limit if this is meant";
+pub(crate) const BY_ROWS: &str = "read it by bands of rows, or raise the limit if this is meant";
 const NOT_BY_ROWS: &str = "convert it to EXR, PNG or TIFF, which are read by bands of rows, or raise the limit if this is meant";
 
 /// What a codec has to say; it becomes an [`Error`] where the file's name is known.

@@ -17,6 +17,8 @@
 //! # Ok::<(), pipe_io::Error>(())
 //! ```
 //!
+//! Pictures that are larger than memory are read and written by bands of rows: [`RowReader`], [`RowWriter`].
+//!
 //! Files are hostile until proven otherwise: declared sizes are checked against [`Limits`] and the file's length
 //! before anything of that size is allocated, and every failure is an [`Error`] that names the file.
 
@@ -55,5 +57,5 @@ pub use self::form::{Compression, Form, WriteOptions, output_form};
 pub use self::input::{Input, ReadOptions, probe, read};
 pub use self::output::{encode, write};
 pub use self::picture::{Alpha, Channels, Header, Layout, Metadata, Picture, Sample, Window};
-pub use self::rows::{RowReader, RowWriter};
+pub use self::rows::{ReadAhead, RowReader, RowWriter, WriteBehind};
 pub use self::source::{Format, Limits, Source, Target};

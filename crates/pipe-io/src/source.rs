@@ -2,15 +2,16 @@
 //!
 //! A source's format is read off its first bytes and never off its name: files are renamed, and streams have no name.
 //! A target has only its name. The whole file is read into memory once; planning (the header) and decoding then work
-//! on the same bytes. Memory mapping was rejected: it needs `unsafe`, a file that shrinks under it kills the process,
-//! and a decoder that reads every byte once gains nothing.
+//! on the same bytes. (Bands of rows are read from the file as they are wanted: [`RowReader`](crate::RowReader).) Memory
+//! mapping was rejected: it needs `unsafe`, a file that shrinks under it kills the process, and a decoder that reads
+//! every byte once gains nothing.
 
 use std::fmt;
 use std::fs::File;
 use std::io::{self, Read};
 use std::path::{Path, PathBuf};
 
-use crate::error::{Error, Fault, RAISE, Result};
+use crate::error::{BY_ROWS, Error, Fault, RAISE, Result};
 use crate::volume::VolumeFormat;
 
 /// A file format for images.
@@ -279,7 +280,8 @@ pub(crate) fn load(source: &Source, limits: &Limits) -> Result<Vec<u8>> {
     }
     if bytes.len() as u64 > limits.max_bytes {
         let reason = format!("it has more than {} bytes", limits.max_bytes);
-        return Err(Error::TooLarge { file: source.to_string(), reason, advice: RAISE });
+        let by_rows = source.path.as_deref().and_then(Format::of_extension).is_some_and(Format::by_rows);
+        return Err(Error::TooLarge { file: source.to_string(), reason, advice: if by_rows { BY_ROWS } else { RAISE } });
     }
     Ok(bytes)
 }

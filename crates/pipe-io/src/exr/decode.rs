@@ -124,7 +124,9 @@ impl Blocks {
     /// Decodes rows into their planes, which are zero there. No two stripes share a row of blocks, or it is decoded twice.
     pub(super) fn decode(&self, opened: &Opened, store: &impl Store, stripes: Vec<Stripe>) -> Result<(), Fault> {
         let bands: Vec<Band> = stripes.into_iter().flat_map(|stripe| self.split(stripe, opened.data)).collect();
-        bands.into_par_iter().try_for_each(|band| shielded(|| band.decode(opened, store, self)))
+        // With fewer bands than threads, the tiles of each are decompressed at the same time too.
+        let at_once = rayon::current_num_threads().div_ceil(bands.len().max(1));
+        bands.into_par_iter().try_for_each(|band| shielded(|| band.decode(opened, store, self, at_once)))
     }
 
     /// The rows of the data window that are decoded together with row `y` of it.
@@ -227,44 +229,59 @@ struct Band<'a> {
 }
 
 impl Band<'_> {
-    fn decode(mut self, opened: &Opened, store: &impl Store, blocks: &Blocks) -> Result<(), Fault> {
-        let part = opened.part();
+    fn decode(mut self, opened: &Opened, store: &impl Store, blocks: &Blocks, at_once: usize) -> Result<(), Fault> {
+        let columns: Vec<usize> = (0..blocks.count.0).filter(|&column| !self.visible(opened, blocks, column).is_empty()).collect();
+        for some in columns.chunks(at_once) {
+            let unpacked = some.par_iter().map(|&column| {
+                shielded(|| {
+                    let (xs, ys) = blocks.area(opened, column, self.row);
+                    let chunk = blocks.chunk(opened, store, column, self.row)?;
+                    decompress(&opened.meta, opened.part(), chunk, xs.len(), ys)
+                })
+            });
+            let unpacked = unpacked.collect::<Result<Vec<_>, _>>()?;
+            some.iter().zip(unpacked).try_for_each(|(&column, block)| self.place(opened, blocks, column, &block))?;
+        }
+        Ok(())
+    }
+
+    /// The columns of the view that a block fills.
+    fn visible(&self, opened: &Opened, blocks: &Blocks, column: usize) -> Range<i64> {
+        let shift = i64::from(opened.data.x) - i64::from(self.planes.view.x);
+        let (xs, _) = blocks.area(opened, column, self.row);
+        (xs.start as i64 + shift).max(0)..(xs.end as i64 + shift).min(i64::from(self.planes.view.width))
+    }
+
+    /// Copies the lines of a block to where they belong.
+    fn place(&mut self, opened: &Opened, blocks: &Blocks, column: usize, block: &[u8]) -> Result<(), Fault> {
+        let visible = self.visible(opened, blocks, column);
         let Planes { list: planes, view, sample } = self.planes;
-        let sample = *sample;
+        let (xs, ys) = blocks.area(opened, column, self.row);
         let shift_x = i64::from(opened.data.x) - i64::from(view.x);
         let shift_y = i64::from(opened.data.y) - i64::from(view.y);
-        for column in 0..blocks.count.0 {
-            let (xs, ys) = blocks.area(opened, column, self.row);
-            let visible = (xs.start as i64 + shift_x).max(0)..(xs.end as i64 + shift_x).min(i64::from(view.width));
-            if visible.is_empty() {
-                continue;
-            }
-            let chunk = blocks.chunk(opened, store, column, self.row)?;
-            let block = decompress(&opened.meta, part, chunk, xs.len(), ys.clone())?;
-            let mut at = 0;
-            for y in ys {
-                for (index, channel) in part.channels.list.iter().enumerate() {
-                    let Some(length) = line_bytes(channel, xs.len(), y) else { continue };
-                    let line = block.get(at..at + length).ok_or_else(|| Fault::damaged("a block is too short"))?;
-                    at += length;
-                    let target_y = y as i64 + shift_y;
-                    if target_y < self.seen.start as i64 || target_y >= self.seen.end as i64 {
+        let mut at = 0;
+        for y in ys {
+            for (index, channel) in opened.part().channels.list.iter().enumerate() {
+                let Some(length) = line_bytes(channel, xs.len(), y) else { continue };
+                let line = block.get(at..at + length).ok_or_else(|| Fault::damaged("a block is too short"))?;
+                at += length;
+                let target_y = y as i64 + shift_y;
+                if target_y < self.seen.start as i64 || target_y >= self.seen.end as i64 {
+                    continue;
+                }
+                for (plane, (first, rows)) in planes.iter().zip(&mut self.rows) {
+                    if plane.channel != Some(index) {
                         continue;
                     }
-                    for (plane, (first, rows)) in planes.iter().zip(&mut self.rows) {
-                        if plane.channel != Some(index) {
-                            continue;
-                        }
-                        let (sx, sy) = plane.sampling;
-                        let row = target_y as usize / sy - *first;
-                        let skipped = (visible.start - shift_x) as usize - xs.start;
-                        let size = channel.sample_type.bytes_per_sample();
-                        let from = skipped / sx * size;
-                        let samples = ((visible.end - visible.start) as usize).div_ceil(sx);
-                        let to = (row * plane.size.0 + visible.start as usize / sx) * sample.bytes();
-                        let target = &mut rows[to..to + samples * sample.bytes()];
-                        copy(&line[from..from + samples * size], channel.sample_type, target, sample);
-                    }
+                    let (sx, sy) = plane.sampling;
+                    let row = target_y as usize / sy - *first;
+                    let skipped = (visible.start - shift_x) as usize - xs.start;
+                    let size = channel.sample_type.bytes_per_sample();
+                    let from = skipped / sx * size;
+                    let samples = ((visible.end - visible.start) as usize).div_ceil(sx);
+                    let to = (row * plane.size.0 + visible.start as usize / sx) * sample.bytes();
+                    let target = &mut rows[to..to + samples * sample.bytes()];
+                    copy(&line[from..from + samples * size], channel.sample_type, target, *sample);
                 }
             }
         }

@@ -11,12 +11,14 @@
 //! interlaced PNG, subsampled chroma, turned TIFF) is decoded whole, once, and has to be within the
 //! [limits](crate::Limits) for that.
 
+mod ahead;
 mod read;
 mod strided;
 mod write;
 
 use std::ops::Range;
 
+pub use self::ahead::{ReadAhead, WriteBehind};
 pub use self::read::RowReader;
 pub(crate) use self::strided::{Number, Order, Strided};
 pub use self::write::RowWriter;

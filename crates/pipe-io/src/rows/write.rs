@@ -30,7 +30,7 @@ use crate::{exr, plain, png, tiff};
 /// # Ok::<(), pipe_io::Error>(())
 /// ```
 pub struct RowWriter {
-    target: Target,
+    pub(super) target: Target,
     /// The picture, without its pixels.
     like: Picture,
     /// Bytes of a row of all channels.
