@@ -29,6 +29,8 @@ pub(crate) struct Cover {
     axis: usize,
     /// Workgroups.
     pub(crate) groups: [u32; 3],
+    /// Groups of a row where there are too many for one row of a dispatch; the others follow in the next ones.
+    row: Option<u32>,
     /// Type of the position: `vec2i`, `vec3i` or `i32`.
     position: &'static str,
     /// Whether it is the grid of a tile.
@@ -61,7 +63,7 @@ impl Cover {
             (Grid::Cover, _) => [shape.entries(), 1, 1],
         };
         if matches!(stage.entry, Entry::Points | Entry::Kernel | Entry::Fold(_)) {
-            let cover = Self { elements, size: [1; 3], each: 1, axis: 0, groups: elements, position, tiled };
+            let cover = Self { elements, size: [1; 3], each: 1, axis: 0, groups: elements, row: None, position, tiled };
             return if stage.entry == Entry::Points { Ok(cover) } else { cover.checked(pass, limits) };
         }
         let cpu = limits.profile == Profile::Cpu;
@@ -79,24 +81,23 @@ impl Cover {
             // Long tables, such as the words of a file, are bound by threads too.
             _ => ([256, 1, 1], if elements[0] >= LONG_TABLE { 4 } else { 1 }, 0),
         };
-        let mut cover = Self { elements, size, each, axis, groups: [0; 3], position, tiled };
-        cover.groups = cover.groups_for(elements);
+        let mut cover = Self { elements, size, each, axis, groups: [0; 3], row: None, position, tiled };
+        cover.groups = cover.groups_of(elements);
         if position == "i32" && cover.groups[0] > limits.max_groups {
-            cover.groups[1] = cover.groups[0].div_ceil(limits.max_groups);
-            cover.groups[0] = limits.max_groups;
+            cover.row = Some(limits.max_groups);
+            cover.groups = cover.groups_of(elements);
         }
         cover.checked(pass, limits)
     }
 
     /// Workgroups that cover so many elements: a part of the grid, no larger than the whole.
     pub(crate) fn groups_of(&self, elements: [u32; 3]) -> [u32; 3] {
-        let [x, y, z] = self.groups_for(elements);
-        // A long row of groups goes on in the next one.
-        if x > self.groups[0] { [self.groups[0], x.div_ceil(self.groups[0]), z] } else { [x, y, z] }
-    }
-
-    fn groups_for(&self, elements: [u32; 3]) -> [u32; 3] {
-        std::array::from_fn(|i| elements[i].div_ceil(self.size[i] * if i == self.axis { self.each } else { 1 }).max(1))
+        let per_group = |i: usize| self.size[i] * if i == self.axis { self.each } else { 1 };
+        let [x, y, z] = std::array::from_fn(|i| elements[i].div_ceil(per_group(i)).max(1));
+        match self.row {
+            Some(row) if x > row => [row, x.div_ceil(row), z],
+            _ => [x, y, z],
+        }
     }
 
     fn checked(self, pass: &KernelPass, limits: &Limits) -> Result<Self, PlanError> {
