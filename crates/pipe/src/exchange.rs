@@ -5,15 +5,15 @@ use std::ops::Range;
 
 use indexmap::IndexMap;
 use pipe_gpu::{Exchange, Rows};
-use pipe_io::{RowReader, RowWriter};
-use pipe_plan::plan::{Crossing, Rect};
+use pipe_io::{ReadAhead, WriteBehind};
+use pipe_plan::plan::{Crossing, Plan, Rect};
 
 use crate::run::{Decoded, Inputs};
 
 /// An output whose tiles arrive.
 struct Arriving {
     /// Where its rows go: into a file, which appears at the end; without one, into memory.
-    file: Option<RowWriter>,
+    file: Option<WriteBehind>,
     whole: Vec<u8>,
     /// Rows that arrive now, and bytes of them that did.
     rows: Range<u32>,
@@ -25,7 +25,7 @@ struct Arriving {
 /// Outputs all of whose tiles arrived.
 pub(crate) struct Arrived {
     /// Files that want to be finished.
-    pub(crate) files: HashMap<String, RowWriter>,
+    pub(crate) files: HashMap<String, WriteBehind>,
     /// Pixels of the others.
     pub(crate) bytes: HashMap<String, Vec<u8>>,
 }
@@ -39,23 +39,26 @@ pub(crate) struct Pictures<'a> {
 /// Where the rows of an input come from.
 enum Source<'a> {
     Memory { bytes: &'a [u8], rows: Range<u32> },
-    File { reader: &'a mut RowReader, rows: Range<u32>, band: Vec<u8> },
+    File { bands: ReadAhead, rows: Range<u32>, band: Vec<u8> },
 }
 
 impl<'a> Pictures<'a> {
-    /// Takes tiles of these pictures.
-    pub(crate) fn of(inputs: impl Iterator<Item = &'a mut Inputs>) -> Self {
-        let source = |decoded: &'a mut Decoded| match decoded {
+    /// Takes the tiles of a plan from these pictures; those that are files yet are read now, and are spent.
+    pub(crate) fn of(inputs: impl Iterator<Item = &'a mut Inputs>, plan: &Plan) -> Self {
+        let source = |name: &str, decoded: &'a mut Decoded| match decoded {
             Decoded::Picture(p) => Some(Source::Memory { bytes: &p.bytes, rows: 0..p.height }),
-            Decoded::Distant(reader) => Some(Source::File { reader, rows: 0..0, band: Vec::new() }),
+            Decoded::Distant(reader) => {
+                let bands = reader.take()?.ahead(bands(plan, name));
+                Some(Source::File { bands, rows: 0..0, band: Vec::new() })
+            }
             Decoded::Volume(_) | Decoded::Table(_) => None,
         };
         let all = inputs.flat_map(|inputs| inputs.iter_mut());
-        Self { inputs: all.filter_map(|(name, d)| Some((name.as_str(), source(d)?))).collect(), outputs: HashMap::new() }
+        Self { inputs: all.filter_map(|(name, d)| Some((name.as_str(), source(name, d)?))).collect(), outputs: HashMap::new() }
     }
 
     /// Puts the tiles of one more plane of an output together, in a file or in memory.
-    pub(crate) fn collect(&mut self, name: &str, file: Option<RowWriter>) {
+    pub(crate) fn collect(&mut self, name: &str, file: Option<WriteBehind>) {
         let new = || Arriving { file: None, whole: Vec::new(), rows: 0..0, band: Vec::new(), arrived: 0, planes: 0 };
         let arriving = self.outputs.entry(name.to_owned()).or_insert_with(new);
         arriving.planes += 1;
@@ -79,9 +82,11 @@ impl Exchange for Pictures<'_> {
     fn rows(&mut self, from: &Crossing) -> Result<Rows<'_>, String> {
         match self.inputs.get_mut(from.name.as_str()) {
             Some(Source::Memory { bytes, rows }) => Ok(Rows { bytes, rows: rows.clone() }),
-            Some(Source::File { reader, rows, band }) => {
+            Some(Source::File { bands, rows, band }) => {
                 if *rows != from.rect.y {
-                    reader.read(from.rect.y.clone(), band).map_err(|e| e.to_string())?;
+                    bands.reuse(std::mem::take(band));
+                    let next = bands.next().ok_or_else(|| format!("`{}` has no more rows", from.name))?;
+                    *band = next.map_err(|e| e.to_string())?;
                     rows.clone_from(&from.rect.y);
                 }
                 Ok(Rows { bytes: band, rows: rows.clone() })
@@ -110,13 +115,20 @@ impl Exchange for Pictures<'_> {
             return Ok(());
         }
         match &mut arriving.file {
-            Some(file) => file.write(&arriving.band).map_err(|e| e.to_string()),
-            None => {
-                arriving.keep(to.size[1] as usize);
-                Ok(())
-            }
+            Some(file) => arriving.band = file.write(std::mem::take(&mut arriving.band)).map_err(|e| e.to_string())?,
+            None => arriving.keep(to.size[1] as usize),
         }
+        arriving.rows = 0..0;
+        Ok(())
     }
+}
+
+/// The rows of a picture that the tiles of a plan ask for, in their order.
+fn bands(plan: &Plan, name: &str) -> Vec<Range<u32>> {
+    let tiles = plan.tilings().flat_map(|t| &t.tiles);
+    let mut rows: Vec<_> = tiles.flat_map(|tile| &tile.uploads).filter(|u| u.name == name).map(|u| u.rect.y.clone()).collect();
+    rows.dedup();
+    rows
 }
 
 impl Arriving {

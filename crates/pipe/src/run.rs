@@ -20,7 +20,7 @@ use pipe_graph::types::{EdgeKind, EdgeType, Element, ImageType, VolumeType};
 use pipe_io::mesh::Mesh;
 use pipe_io::table::Table;
 use pipe_io::volume::{Volume, VolumeHeader, Voxel};
-use pipe_io::{Animation, Channels, Header, Metadata, Picture, ReadOptions, RowReader, RowWriter, Source, Target, WriteOptions};
+use pipe_io::{Animation, Channels, Header, Metadata, Picture, ReadOptions, RowReader, RowWriter, Source, Target, WriteBehind, WriteOptions};
 use pipe_plan::lower::{Rim, file_name, readback_name};
 use pipe_plan::{Options, Plan};
 
@@ -167,8 +167,8 @@ impl Report {
 pub enum Decoded {
     /// An image.
     Picture(Picture),
-    /// An image so large that its rows are better decoded when they are needed.
-    Distant(RowReader),
+    /// An image so large that its rows are better decoded when they are needed; `None` once they were.
+    Distant(Option<RowReader>),
     /// A volume.
     Volume(Volume),
     /// A table.
@@ -178,7 +178,9 @@ pub enum Decoded {
 impl Decoded {
     /// Decodes a picture of which only the header was read.
     fn bring(&mut self) -> Result<(), Failure> {
-        if let Self::Distant(reader) = self {
+        if let Self::Distant(reader) = self
+            && let Some(mut reader) = reader.take()
+        {
             let (w, h) = (reader.header().width, reader.header().height);
             let mut bytes = Vec::new();
             reader.read(0..h, &mut bytes)?;
@@ -202,7 +204,8 @@ impl Decoded {
     fn ty(&self) -> EdgeType {
         match self {
             Self::Picture(p) => EdgeType::Image(ImageType::new([p.width, p.height], forms::image_channels(p.channels))),
-            Self::Distant(r) => {
+            Self::Distant(None) => unreachable!("a file that was read row by row is not read again"),
+            Self::Distant(Some(r)) => {
                 let header = r.header();
                 EdgeType::Image(ImageType::new([header.width, header.height], forms::image_channels(header.channels)))
             }
@@ -229,7 +232,7 @@ fn picture(file: &str, job: &Job) -> Result<Decoded, Failure> {
         let bytes = |h: &Header| u64::from(h.width) * u64::from(h.height) * h.channels.count() as u64 * h.sample.bytes() as u64;
         let large = |bytes: u64| bytes >= LARGE || job.budget.is_some_and(|budget| bytes >= budget / 4);
         if header.as_ref().map_or(true, |h| large(bytes(h))) {
-            return Ok(Decoded::Distant(RowReader::open(&source, &job.read)?));
+            return Ok(Decoded::Distant(Some(RowReader::open(&source, &job.read)?)));
         }
     }
     Ok(Decoded::Picture(pipe_io::read(&source, &job.read)?))
@@ -253,7 +256,7 @@ pub fn decode(job: &Job, kinds: &HashMap<String, EdgeKind>) -> Result<Inputs, Fa
 pub struct Finished {
     images: Vec<(Target, Picture)>,
     /// Files that all rows were written to, and that appear at the end.
-    written: Vec<RowWriter>,
+    written: Vec<WriteBehind>,
     volumes: Vec<(PathBuf, Volume)>,
     meshes: Vec<(PathBuf, Mesh)>,
     data: Vec<(ReadbackFile, Vec<u8>)>,
@@ -424,7 +427,7 @@ impl Session {
         outputs: &[Output],
         [inputs, files]: [&mut Inputs; 2],
         options: &RunOptions<'_>,
-    ) -> Result<(Outputs, HashMap<String, RowWriter>), Failure> {
+    ) -> Result<(Outputs, HashMap<String, WriteBehind>), Failure> {
         let prepared = self.prepared.as_ref().expect("a plan is prepared before it runs");
         if plan.tilings().next().is_none() {
             let held: HashMap<&str, Cow<'_, [u8]>> = inputs.iter().chain(&*files).map(|(n, d)| (n.as_str(), d.bytes())).collect();
@@ -435,7 +438,7 @@ impl Session {
         let held: HashMap<String, Vec<u8>> =
             inputs.iter().chain(&*files).filter(|(n, _)| needed(n)).map(|(n, d)| (n.clone(), d.bytes().into_owned())).collect();
         let given: HashMap<&str, &[u8]> = held.iter().map(|(n, b)| (n.as_str(), b.as_slice())).collect();
-        let mut pictures = Pictures::of([inputs, files].into_iter());
+        let mut pictures = Pictures::of([inputs, files].into_iter(), plan);
         for fetch in plan.tilings().flat_map(|t| t.tiles.first()).flat_map(|t| &t.fetches) {
             let image = outputs.iter().find(|o| o.name == fetch.name).and_then(|o| match &o.to {
                 Packed::Image { target, form, size } if !target.format.moves() => Some((target, form, size, &o.metadata)),
@@ -443,7 +446,7 @@ impl Session {
             });
             let file = image.filter(|_| fetch.plane == 0).map(|(target, form, [w, h], metadata)| {
                 let picture = form.picture(*w, *h, Vec::new(), metadata.clone().unwrap_or_default());
-                RowWriter::create(target, &picture, &WriteOptions { channels: Some(picture.channels), ..job.write.clone() })
+                RowWriter::create(target, &picture, &WriteOptions { channels: Some(picture.channels), ..job.write.clone() }).map(RowWriter::behind)
             });
             pictures.collect(&fetch.name, file.transpose()?);
         }
@@ -540,15 +543,15 @@ fn rim(job: &Job, graph: &Graph, inputs: &Inputs, files: &Inputs) -> Result<(Rim
     for (name, value) in inputs.iter().chain(files) {
         match value {
             Decoded::Picture(p) => drop(rim.inputs.insert(name.clone(), forms::of_picture(p))),
-            Decoded::Distant(r) => drop(rim.inputs.insert(name.clone(), forms::of_header(r.header(), r.layout()))),
+            Decoded::Distant(Some(r)) => drop(rim.inputs.insert(name.clone(), forms::of_header(r.header(), r.layout()))),
             Decoded::Volume(v) => drop(rim.volumes.insert(name.clone(), forms::of_volume(&v.header))),
-            Decoded::Table(_) => {}
+            Decoded::Table(_) | Decoded::Distant(None) => {}
         }
     }
     let all_inputs = || inputs.values().chain(files.values());
     let first = all_inputs().find_map(|d| match d {
         Decoded::Picture(p) => Some(&p.metadata),
-        Decoded::Distant(r) => Some(&r.header().metadata),
+        Decoded::Distant(Some(r)) => Some(&r.header().metadata),
         _ => None,
     });
     let first_volume = all_inputs().find_map(|d| if let Decoded::Volume(v) = d { Some(&v.header) } else { None });
