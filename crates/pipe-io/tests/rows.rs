@@ -409,3 +409,29 @@ fn gigapixel(format: Format, sample: Sample) {
         assert!(band == pixels(rows.clone()), "{format:?}, rows {rows:?}");
     }
 }
+
+#[cfg(unix)]
+#[test]
+fn what_cannot_seek_gets_the_same_file() {
+    use std::io::Read;
+    let folder = tempfile::tempdir().unwrap();
+    for format in [Format::Exr, Format::Tiff, Format::Pfm, Format::Npy, Format::Qoi] {
+        // A pipe with a name.
+        let path = folder.path().join(format.name());
+        assert!(std::process::Command::new("mkfifo").arg(&path).status().unwrap().success());
+        let whole = picture(format, HEIGHT, &WriteOptions::default());
+        let target = Target { path: Some(path.clone()), format };
+        let expected = encode(&target, &whole, &WriteOptions::default()).unwrap();
+        let reader = std::thread::spawn(move || {
+            let mut bytes = Vec::new();
+            std::fs::File::open(path).unwrap().read_to_end(&mut bytes).unwrap();
+            bytes
+        });
+        let mut writer = RowWriter::create(&target, &whole, &WriteOptions::default()).unwrap();
+        for rows in bands(HEIGHT, 16, 0) {
+            writer.write(&cut(&whole, &rows)).unwrap();
+        }
+        writer.finish().unwrap();
+        assert!(reader.join().unwrap() == expected, "{format:?}");
+    }
+}
