@@ -5,7 +5,7 @@ use std::cell::RefCell;
 
 use pipe_graph::graph::Graph;
 use pipe_graph::pass::{Limits, Profile};
-use pipe_graph::reference::Tensor;
+use pipe_graph::reference::{Raster, Tensor};
 use pipe_plan::lower::{Rim, lower};
 use pipe_plan::{Options, Phase, Plan};
 use pipe_tests::bench::{Bench, compile, plan, reference};
@@ -207,6 +207,54 @@ fn reductions_that_share_a_walk_give_the_same_bits() {
                     let bits = |values: &[f64]| values.iter().map(|v| v.to_bits()).collect::<Vec<_>>();
                     assert_eq!(bits(values), bits(&alone[name]), "{name} at {size:?}, {profile:?}");
                 }
+            }
+        }
+    }
+}
+
+/// Nodes whose parameters leave every value as it is.
+const UNTOUCHED: [&str; 14] = [
+    r#"Exposure(image: "a")"#,
+    r#"Exposure(image: "a", ev: 0, options: (repeat: 3))"#,
+    r#"Gamma(image: "a")"#,
+    r#"Grade(image: "a")"#,
+    r#"Shuffle(image: "a")"#,
+    r#"Colorspace(image: "a", from: "srgb", to: "srgb")"#,
+    r#"Offset(image: "a")"#,
+    r#"Crop(image: "a")"#,
+    r#"Pad(image: "a")"#,
+    r#"BoxBlur(image: "a", radius: 0)"#,
+    r#"BlurH(image: "a", sigma: 0)"#,
+    r#"BlurV(image: "a", weights: [1])"#,
+    r#"GaussianBlur(image: "a", sigma: 0)"#,
+    r#"GaussianBlur(image: "a", sigma: (0, 0), method: Recursive)"#,
+];
+
+/// As it would be stored: NaN, infinities and negative values too.
+#[test]
+fn nodes_that_change_nothing_are_no_passes() {
+    let mut bench = Bench::new();
+    let special = [f64::NAN, f64::INFINITY, f64::NEG_INFINITY, -0.5, 65504.0, 1e-3];
+    let image = Raster::from_fn(SIZE, 4, |x, y| std::array::from_fn(|c| special[((x + 3 * y) as usize + c) % special.len()]));
+    for node in UNTOUCHED {
+        let with = |nodes: &str, last: &str| {
+            let text = format!(r#"Graph(version: 1, inputs: {{"a": Image}}, nodes: {{{nodes}}}, outputs: {{"out": "{last}"}})"#);
+            compile(&text, &[("a", edge_type("in", SIZE))]).unwrap_or_else(|e| panic!("{text}\n{e}"))
+        };
+        let iterated = format!(
+            r#""n": Iterate(state: {{"u": "a"}}, body: {{"s": {}}}, next: {{"u": "s"}}, count: 3)"#,
+            node.replace("\"a\"", "\"u\"")
+        );
+        for (nodes, passes) in [(format!(r#""n": {node}"#), Some(0)), (iterated, None)] {
+            let graph = with(&nodes, "n");
+            let plan = planned(&graph, &bench.limits(), false);
+            if let Some(passes) = passes {
+                // Decoding and encoding are left.
+                assert_eq!(plan.pass_count(), passes + 2, "{nodes}\n{}", plan.to_text());
+            }
+            let got = bench.run(&graph, plan, &|_| Tensor::Image(image.clone())).unwrap_or_else(|e| panic!("{nodes}: {e}"));
+            for (g, e) in got["out"].iter().zip(image.pixels.iter().flatten()) {
+                assert!(g.to_bits() == (*e as f32 as f64).to_bits() || (g.is_nan() && e.is_nan()), "{nodes}: {g}, expected {e}");
             }
         }
     }

@@ -236,6 +236,16 @@ impl<'a> Lowering<'a> {
         self.emitted.insert(port.to_owned(), Carried::One(id));
     }
 
+    /// Lets an input leave by a port as it is, unless another type leaves there, such as half precision. For parameters that
+    /// leave every value as it is, NaN and infinity too: then no pass is needed. Answers whether it left.
+    pub fn pass_on(&mut self, port: &str, id: ResourceId) -> bool {
+        let same = Shape::of_edge(&self.output_type(port)) == Some(self.shape(id));
+        if same {
+            self.emit(port, id);
+        }
+        same
+    }
+
     /// Lets a mesh leave by a port.
     pub fn emit_mesh(&mut self, port: &str, parts: MeshParts) {
         self.emitted.insert(port.to_owned(), Carried::Mesh(parts));

@@ -4,7 +4,7 @@ use glam::{DMat3, DVec3};
 use pipe_graph::prelude::*;
 use smart_default::SmartDefault;
 
-use crate::colour::point::{map_tinted, point, tinted};
+use crate::colour::point::{map_tinted, point, tinted, untouched};
 use crate::colour::primaries::{ACES_AP0, ACES_AP1, Chromaticities, P3, REC709, REC2020, rows, to_xyz};
 use crate::shader;
 
@@ -136,6 +136,9 @@ impl Node for Colorspace {
 
     fn lower(&self, cx: &mut Lowering<'_>) -> Result<(), Mistake> {
         let (from, to) = self.spaces()?;
+        if untouched(cx, &self.image, from == to) {
+            return Ok(());
+        }
         let [row0, row1, row2] = rows(&(to.to_xyz().inverse() * from.to_xyz()));
         point(cx, &self.image, shader!("colour/colorspace"))
             .constant("DECODE", from.transfer as i32)

@@ -3,7 +3,7 @@
 use pipe_graph::prelude::*;
 use smart_default::SmartDefault;
 
-use crate::colour::point::{map_rgb, point, same};
+use crate::colour::point::{map_rgb, point, same, untouched};
 use crate::shader;
 
 /// Raises colour to 1/gamma; negative values keep their sign. Alpha is kept.
@@ -28,6 +28,9 @@ impl Node for Gamma {
     }
 
     fn lower(&self, cx: &mut Lowering<'_>) -> Result<(), Mistake> {
+        if untouched(cx, &self.image, matches!(self.gamma, 1.0)) {
+            return Ok(());
+        }
         point(cx, &self.image, shader!("colour/gamma")).param("power", 1.0 / self.gamma).add();
         Ok(())
     }

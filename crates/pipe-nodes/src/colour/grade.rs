@@ -3,7 +3,7 @@
 use pipe_graph::prelude::*;
 use smart_default::SmartDefault;
 
-use crate::colour::point::{map_tinted, point, tinted};
+use crate::colour::point::{map_tinted, point, tinted, untouched};
 use crate::components::Rgb;
 use crate::shader;
 
@@ -52,12 +52,23 @@ impl Grade {
     }
 }
 
+impl Grade {
+    /// Whether every value stays as it is.
+    fn is_neutral(&self) -> bool {
+        let [zero, one] = [0.0, 1.0].map(Rgb::grey);
+        [self.lift, self.offset] == [zero; 2] && [self.gain, self.gamma, self.multiply] == [one; 3]
+    }
+}
+
 impl Node for Grade {
     fn outputs(&self, inputs: &mut Inputs<'_>) -> Result<Vec<Output>, Mistake> {
         tinted(inputs, &self.image, self.tints())
     }
 
     fn lower(&self, cx: &mut Lowering<'_>) -> Result<(), Mistake> {
+        if untouched(cx, &self.image, self.is_neutral()) {
+            return Ok(());
+        }
         point(cx, &self.image, shader!("colour/grade"))
             .param("lift", self.lift.0)
             .param("gain", self.gain.0)

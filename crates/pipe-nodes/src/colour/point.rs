@@ -19,6 +19,12 @@ pub(crate) const fn tinted_channels(channels: u8, tints: bool) -> u8 {
     if tints && channels == 1 { 4 } else { channels }
 }
 
+/// Lets the image leave as it is, if it is `neutral` to do so and no other type is asked for. Answers whether it left.
+pub(crate) fn untouched(cx: &mut Lowering<'_>, image: &In<Image>, neutral: bool) -> bool {
+    let image = cx.input(image);
+    neutral && cx.pass_on("out", image)
+}
+
 /// A point pass from `image` to `out`; parameters are to be added.
 pub(crate) fn point<'b, 'a>(cx: &'b mut Lowering<'a>, image: &In<Image>, shader: Shader) -> PassBuilder<'b, 'a> {
     let (image, out) = (cx.input(image), cx.output("out"));

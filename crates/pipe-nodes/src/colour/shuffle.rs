@@ -3,7 +3,7 @@
 use pipe_graph::prelude::*;
 use smart_default::SmartDefault;
 
-use crate::colour::point::point;
+use crate::colour::point::{point, untouched};
 use crate::shader;
 
 /// Fills each channel from a channel of the input, or with 0 or 1. The output has 4 channels.
@@ -51,12 +51,22 @@ pub(super) const KIND: Kind = Kind::of::<Shuffle>(
 .tolerance(0.0, 0.0)
 .sets_alpha();
 
+impl Shuffle {
+    /// Whether every channel stays where it is.
+    const fn is_neutral(&self) -> bool {
+        matches!((self.r, self.g, self.b, self.a), (Channel::R, Channel::G, Channel::B, Channel::A))
+    }
+}
+
 impl Node for Shuffle {
     fn outputs(&self, inputs: &mut Inputs<'_>) -> Result<Vec<Output>, Mistake> {
         Ok(Output::out(EdgeType::Image(inputs.image(&self.image).with_channels(4))))
     }
 
     fn lower(&self, cx: &mut Lowering<'_>) -> Result<(), Mistake> {
+        if untouched(cx, &self.image, self.is_neutral()) {
+            return Ok(());
+        }
         let mut pass = point(cx, &self.image, shader!("colour/shuffle"));
         for (name, channel) in [("RED", self.r), ("GREEN", self.g), ("BLUE", self.b), ("ALPHA", self.a)] {
             pass = pass.constant(name, channel as i32);

@@ -87,7 +87,12 @@ impl Node for Pad {
     }
 
     fn lower(&self, cx: &mut Lowering<'_>) -> Result<(), Mistake> {
-        let (image, out) = (cx.input(&self.image), cx.output("out"));
+        let image = cx.input(&self.image);
+        // Of the same size: nothing was added.
+        if cx.pass_on("out", image) {
+            return Ok(());
+        }
+        let out = cx.output("out");
         cx.pass("", shader!("composite/pad"))
             .read_with("image", image, Reach::Whole, self.fill.border(), Filter::Nearest)
             .write("out", out)
