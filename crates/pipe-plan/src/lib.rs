@@ -30,11 +30,14 @@ pub struct Options {
     pub fuse: bool,
     /// Bytes that may be alive at once; overrides what the device says.
     pub budget: Option<u64>,
+    /// Give every value a slot of its own where half of the budget is enough for that, so that what one run made is
+    /// still there in the next.
+    pub keep: bool,
 }
 
 impl Default for Options {
     fn default() -> Self {
-        Self { fuse: true, budget: None }
+        Self { fuse: true, budget: None, keep: false }
     }
 }
 

@@ -16,6 +16,7 @@
 //! ```
 
 pub mod compare;
+pub mod decode;
 mod failure;
 mod forms;
 pub mod frames;

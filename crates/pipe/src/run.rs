@@ -4,7 +4,7 @@
 //! temporary file that is renamed at the end; so a run that fails leaves every old file as it was.
 
 use std::borrow::Cow;
-use std::collections::HashMap;
+use std::collections::{BTreeSet, HashMap};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
@@ -13,17 +13,18 @@ use std::time::{Duration, Instant};
 use indexmap::IndexMap;
 use pipe_gpu::{Choice, Device, Executor, Prepared, RunOptions};
 use pipe_graph::graph::{Graph, Instance, Work};
-use pipe_graph::node::{FileSource, ReadbackFile};
+use pipe_graph::node::ReadbackFile;
 use pipe_graph::pass::Limits;
 use pipe_graph::resolve::Request;
 use pipe_graph::types::{EdgeKind, EdgeType, Element, ImageType, VolumeType};
 use pipe_io::mesh::Mesh;
 use pipe_io::table::Table;
 use pipe_io::volume::{Volume, VolumeHeader, Voxel};
-use pipe_io::{Animation, Channels, Metadata, Picture, ReadOptions, Source, Target, WriteOptions};
-use pipe_plan::lower::{Rim, file_name, lower, readback_name};
+use pipe_io::{Animation, Channels, Metadata, Picture, ReadOptions, Target, WriteOptions};
+use pipe_plan::lower::{Rim, lower, readback_name};
 use pipe_plan::{Options, Plan};
 
+use crate::decode::{self, Decoder};
 use crate::project::{Project, World};
 use crate::{Failure, forms, readback};
 
@@ -71,6 +72,9 @@ pub struct Job {
     pub rate: f64,
     /// Frames that this session ran before, for `Feedback`.
     pub frames_before: u32,
+    /// Keep results on the device, as far as half of the budget goes, and leave out what a later run of the session
+    /// finds there.
+    pub keep: bool,
 }
 
 impl Job {
@@ -93,6 +97,7 @@ impl Job {
             frame: 1.0,
             rate: 24.0,
             frames_before: 0,
+            keep: false,
         }
     }
 
@@ -140,6 +145,10 @@ pub struct Report {
     pub wall: Wall,
     /// GPU time by pass, when it was measured.
     pub passes: IndexMap<String, f64>,
+    /// How many passes ran.
+    pub passes_run: usize,
+    /// How many did not, since the device still held what they make.
+    pub passes_kept: usize,
     /// Bytes that the plan's slots take.
     pub peak_bytes: u64,
     /// Warnings about the graph, rendered.
@@ -149,7 +158,7 @@ pub struct Report {
 }
 
 impl Report {
-    /// `--stats`: `{device, size, readbacks, timings, peak_bytes}`.
+    /// `--stats`: `{device, size, readbacks, timings, passes, passes_run, passes_kept, peak_bytes}`.
     pub fn to_json(&self) -> serde_json::Value {
         serde_json::json!({
             "device": self.device,
@@ -157,6 +166,8 @@ impl Report {
             "readbacks": self.readbacks,
             "timings": self.wall,
             "passes": self.passes,
+            "passes_run": self.passes_run,
+            "passes_kept": self.passes_kept,
             "peak_bytes": self.peak_bytes,
         })
     }
@@ -193,21 +204,7 @@ impl Decoded {
 }
 
 /// All inputs of one frame, by graph input and by [`file_name`] of files that nodes read.
-pub type Inputs = IndexMap<String, Decoded>;
-
-/// Reads every input file of a job.
-pub fn decode(job: &Job, kinds: &HashMap<String, EdgeKind>) -> Result<Inputs, Failure> {
-    let mut inputs = Inputs::new();
-    for (name, file) in &job.inputs {
-        let value = match kinds.get(name) {
-            Some(EdgeKind::Table) => Decoded::Table(pipe_io::table::read(Path::new(file))?),
-            Some(EdgeKind::Volume) => Decoded::Volume(pipe_io::volume::read(&Source::parse(file), &job.read.limits)?),
-            _ => Decoded::Picture(pipe_io::read(&Source::parse(file), &job.read)?),
-        };
-        inputs.insert(name.clone(), value);
-    }
-    Ok(inputs)
-}
+pub type Inputs = IndexMap<String, Arc<Decoded>>;
 
 /// What comes out of a run before it is written.
 pub struct Finished {
@@ -256,12 +253,22 @@ impl Finished {
 pub struct Session {
     executor: Executor,
     prepared: Option<Prepared>,
+    inputs: Decoder,
+    /// Files that nodes read.
+    files: Decoder,
+    seen: BTreeSet<PathBuf>,
 }
 
 impl Session {
     /// Opens a device; `cache` is a folder for compiled pipelines.
     pub fn open(choice: &Choice, cache: Option<&Path>) -> Result<Self, Failure> {
-        Ok(Self { executor: Executor::new(Device::open(choice)?, cache), prepared: None })
+        let executor = Executor::new(Device::open(choice)?, cache);
+        Ok(Self { executor, prepared: None, inputs: Decoder::default(), files: Decoder::default(), seen: BTreeSet::new() })
+    }
+
+    /// The files that the last run looked at, whether it succeeded or not: the graph, what it includes, inputs.
+    pub fn files(&self) -> &BTreeSet<PathBuf> {
+        &self.seen
     }
 
     /// The device's name.
@@ -282,8 +289,12 @@ impl Session {
     /// Runs a job from files to files.
     pub fn run(&mut self, job: &Job) -> Result<Report, Failure> {
         let started = Instant::now();
+        self.seen = BTreeSet::from([PathBuf::from(&job.graph)]);
         let kinds = input_kinds(&mut Project::open(&job.graph)?);
-        let inputs = decode(job, &kinds)?;
+        // An input that is overwritten changes because of the run.
+        let kept = job.inputs.iter().filter(|(_, file)| job.outputs.values().all(|out| out != *file));
+        self.seen.extend(kept.filter_map(|(name, file)| decode::path(file, *kinds.get(name)?)));
+        let inputs = self.inputs.inputs(job, &kinds)?;
         let decoded = millis(started);
         let mut finished = self.execute(job, &inputs, None, None)?;
         finished.report.wall.decode = decoded;
@@ -301,10 +312,12 @@ impl Session {
     ) -> Result<Finished, Failure> {
         let started = Instant::now();
         let mut project = Project::open(&job.graph)?;
-        let world = World { read: job.read };
+        let world = World::new(job.read);
         let request = request(job, inputs);
-        let Some(graph) = project.resolve(&request, &world) else { return Err(project.failure(false)) };
-        let files = read_files(&graph, job)?;
+        let graph = project.resolve(&request, &world);
+        self.seen.extend(world.files());
+        let Some(graph) = graph else { return Err(project.failure(false)) };
+        let files = self.files.files_of(&graph, &job.read)?;
         let (rim, outputs) = rim(job, &graph, inputs, &files)?;
         let plan = Arc::new(make_plan(&graph, &rim, &self.limits(), job)?);
         self.prepare(&plan)?;
@@ -312,7 +325,7 @@ impl Session {
 
         let held: HashMap<&str, Cow<'_, [u8]>> = inputs.iter().chain(&files).map(|(n, d)| (n.as_str(), d.bytes())).collect();
         let given: HashMap<&str, &[u8]> = held.iter().map(|(n, b)| (*n, b.as_ref())).collect();
-        let options = RunOptions { timeout: job.timeout, profile: job.profile, cancel, progress };
+        let options = RunOptions { timeout: job.timeout, profile: job.profile, cancel, progress, keep: job.keep };
         let prepared = self.prepared.as_ref().expect("prepared above");
         let mut ran = self.executor.run(prepared, &given, &options)?;
 
@@ -322,6 +335,8 @@ impl Session {
             warnings: project.render(false),
             peak_bytes: plan.peak_bytes,
             passes: std::mem::take(&mut ran.timings.passes),
+            passes_run: ran.timings.passes_run,
+            passes_kept: ran.timings.passes_kept,
             ..Report::default()
         };
         report.wall.plan = planned;
@@ -390,7 +405,7 @@ pub fn input_kinds(project: &mut Project) -> HashMap<String, EdgeKind> {
 
 /// What the resolver must know of a job.
 pub fn request(job: &Job, inputs: &Inputs) -> Request {
-    let spacing = |(name, value): (&String, &Decoded)| match value {
+    let spacing = |(name, value): (&String, &Arc<Decoded>)| match &**value {
         Decoded::Volume(volume) => Some((name.clone(), volume.header.spacing)),
         _ => None,
     };
@@ -402,33 +417,6 @@ pub fn request(job: &Job, inputs: &Inputs) -> Request {
         frame: job.frame,
         time: (job.frame - 1.0) / job.rate,
     }
-}
-
-/// Files that nodes of the graph read.
-fn read_files(graph: &Graph, job: &Job) -> Result<Inputs, Failure> {
-    let mut files = Inputs::new();
-    let mut open: Vec<&Graph> = vec![graph];
-    while let Some(graph) = open.pop() {
-        for (_, instance) in graph.iter() {
-            match &instance.work {
-                Work::Node(node) => {
-                    let Some(source) = node.file() else { continue };
-                    let name = file_name(&source);
-                    if files.contains_key(&name) {
-                        continue;
-                    }
-                    let decoded = match &source {
-                        FileSource::Image(path) => Decoded::Picture(pipe_io::read(&Source::parse(path), &job.read)?),
-                        FileSource::Volume(path) => Decoded::Volume(pipe_io::volume::read(&Source::parse(path), &job.read.limits)?),
-                    };
-                    files.insert(name, decoded);
-                }
-                Work::Iterate(iteration) => open.push(&iteration.body),
-                _ => {}
-            }
-        }
-    }
-    Ok(files)
 }
 
 /// A fetched output on its way to a file.
@@ -449,15 +437,15 @@ enum Packed {
 fn rim(job: &Job, graph: &Graph, inputs: &Inputs, files: &Inputs) -> Result<(Rim, Vec<Output>), Failure> {
     let mut rim = Rim { frames_before: job.frames_before, seed: job.seed, ..Rim::default() };
     for (name, value) in inputs.iter().chain(files) {
-        match value {
+        match &**value {
             Decoded::Picture(p) => drop(rim.inputs.insert(name.clone(), forms::of_picture(p))),
             Decoded::Volume(v) => drop(rim.volumes.insert(name.clone(), forms::of_volume(&v.header))),
             Decoded::Table(_) => {}
         }
     }
     let all_inputs = || inputs.values().chain(files.values());
-    let first = all_inputs().find_map(|d| if let Decoded::Picture(p) = d { Some(&p.metadata) } else { None });
-    let first_volume = all_inputs().find_map(|d| if let Decoded::Volume(v) = d { Some(&v.header) } else { None });
+    let first = all_inputs().find_map(|d| if let Decoded::Picture(p) = &**d { Some(&p.metadata) } else { None });
+    let first_volume = all_inputs().find_map(|d| if let Decoded::Volume(v) = &**d { Some(&v.header) } else { None });
     let mut outputs = Vec::new();
     let named = graph.outputs().map(|(n, v)| (n.to_owned(), v));
     let asked: Vec<_> = named.filter_map(|(n, v)| Some((job.outputs.get(&n)?.clone(), n, v))).collect();
@@ -568,5 +556,5 @@ pub fn make_plan(graph: &Graph, rim: &Rim, limits: &Limits, job: &Job) -> Result
         let name = f.name.split_once('.').map_or(f.name.as_str(), |(name, _)| name);
         job.outputs.contains_key(name) || !graph.outputs().any(|(n, _)| n == name)
     });
-    Ok(pipe_plan::plan(&graph.name, passes, limits, &Options { fuse: job.fuse, budget: job.budget })?)
+    Ok(pipe_plan::plan(&graph.name, passes, limits, &Options { fuse: job.fuse, budget: job.budget, keep: job.keep })?)
 }
