@@ -8,18 +8,19 @@ use std::collections::HashMap;
 use std::ops::Range;
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
-use std::sync::{Arc, PoisonError};
+use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 use indexmap::IndexMap;
-use pipe_plan::plan::{Crossing, Plan};
+use pipe_plan::plan::{Crossing, Plan, SlotId, Step, Upload};
 
 use crate::device::Device;
 use crate::error::GpuError;
 use crate::history::Histories;
+use crate::memo::{self, Act, Course, Key};
 use crate::patience::Patience;
 use crate::pipelines::Pipelines;
-use crate::prepare::{Prepared, Ready, ReadyTiles, kernel_names};
+use crate::prepare::{Memo, Prepared, Ready, ReadyTiles, kernel_names};
 use crate::record::Recorder;
 use crate::storage::{self, Memory, Pool};
 use crate::tiles::{self, Exchange, InMemory};
@@ -36,6 +37,8 @@ pub struct RunOptions<'a> {
     pub cancel: Option<&'a AtomicBool>,
     /// Told now and then: iterations recorded and to do of the outermost loop that is running.
     pub progress: Option<&'a (dyn Fn(u32, u32) + Sync)>,
+    /// Leave out what the device still holds from earlier runs. Inputs are then hashed instead of uploaded blindly.
+    pub keep: bool,
 }
 
 /// Wall time of the parts of a run, and GPU time where it was measured.
@@ -49,6 +52,10 @@ pub struct Timings {
     pub readback_ms: f64,
     /// GPU milliseconds by pass name, summed over iterations, in the order of first launch; empty unless profiled.
     pub passes: IndexMap<String, f64>,
+    /// How many of the plan's passes ran; a loop counts as one.
+    pub passes_run: usize,
+    /// How many were left out, since the device still held what they would have made.
+    pub passes_kept: usize,
 }
 
 /// What came back.
@@ -79,6 +86,8 @@ pub struct Executor {
     transfer: Transfer,
     histories: Histories,
     budget: Option<u64>,
+    /// What each input was in the last run, by name.
+    inputs: HashMap<String, Key>,
 }
 
 impl Executor {
@@ -86,7 +95,7 @@ impl Executor {
     pub fn new(device: Device, cache: Option<&Path>) -> Self {
         let pipelines = cache.map(|folder| Pipelines::with_cache(&device, folder)).unwrap_or_default();
         let (pool, transfer, histories) = (Pool::default(), Transfer::new(), Histories::default());
-        Self { device, pipelines, pool, transfer, histories, budget: None }
+        Self { device, pipelines, pool, transfer, histories, budget: None, inputs: HashMap::new() }
     }
 
     /// The device.
@@ -106,7 +115,11 @@ impl Executor {
             self.transfer.fit(budget - storage::bytes_needed(&plan));
         }
         let pipelines = self.pipelines.compile(&self.device, &plan.kernels, &kernel_names(&plan))?;
-        let memory = self.pool.take(&self.device, &plan)?;
+        let steps = memo::steps(&plan);
+        // Inputs are most likely what they were; a wrong guess only takes memory with nothing useful in it.
+        let acts = acts(&plan, &steps, |upload| self.inputs.get(&upload.name).map_or_else(memo::unique, |key| of_upload(*key, upload)));
+        let useful = Course::new(&acts, plan.slots.len()).contents();
+        let (memory, contents) = self.pool.take(&self.device, &plan, &useful)?;
         let uniforms = (!plan.uniforms.is_empty()).then(|| {
             let bytes = pad(&plan.uniforms);
             let buffer = self.device.device.create_buffer(&wgpu::BufferDescriptor {
@@ -118,9 +131,7 @@ impl Executor {
             self.device.queue.write_buffer(&buffer, 0, &bytes);
             buffer
         });
-        let prepared = Prepared::new(&self.device, plan, memory, uniforms, &pipelines)?;
-        self.write_literals(&prepared)?;
-        Ok(prepared)
+        Prepared::new(&self.device, plan, memory, Memo { steps, contents: Mutex::new(contents) }, uniforms, &pipelines)
     }
 
     /// Takes over a plan that differs from the prepared one in uniforms and literals only, making nothing anew;
@@ -145,23 +156,20 @@ impl Executor {
         if !same {
             return Ok(false);
         }
-        let literals = old.literals != plan.literals;
         if old.uniforms != plan.uniforms
             && let Some(buffer) = &prepared.uniforms
         {
             self.device.queue.write_buffer(buffer, 0, &pad(&plan.uniforms));
         }
+        prepared.memo.steps = memo::steps(plan);
         prepared.plan = plan.clone();
-        if literals {
-            self.write_literals(prepared)?;
-        }
         Ok(true)
     }
 
     /// Gives the memory of a prepared plan back, so that the next plan can use it.
     pub fn release(&mut self, prepared: Prepared) {
-        let Prepared { plan, memory, .. } = prepared;
-        self.pool.give(&plan, memory);
+        let Prepared { plan, memory, memo, .. } = prepared;
+        self.pool.give(&plan, memory, memo.contents.into_inner().unwrap_or_else(PoisonError::into_inner));
     }
 
     /// Forgets all values of earlier frames: the next frame is a first one.
@@ -214,25 +222,49 @@ impl Executor {
         let mut timings = Timings::default();
 
         let started = Instant::now();
-        for upload in &plan.uploads {
-            let source = inputs.get(upload.name.as_str()).copied().unwrap_or_default();
-            let wanted = upload.ranges.iter().map(|r| r.end).max().unwrap_or(0);
-            if (source.len() as u64) < wanted {
-                return Err(GpuError::ShortInput { name: upload.name.clone(), got: source.len() as u64, wanted });
-            }
+        let sources = plan.uploads.iter().map(|upload| source(upload, inputs)).collect::<Result<Vec<_>, GpuError>>()?;
+        if options.keep {
+            self.inputs = inputs.iter().map(|(name, bytes)| ((*name).to_owned(), memo::of_bytes(bytes))).collect();
+        } else {
+            self.inputs.clear();
+        }
+        let acts = acts(plan, &prepared.memo.steps, |upload| {
+            self.inputs.get(&upload.name).map_or_else(memo::unique, |key| of_upload(*key, upload))
+        });
+        // Should the run end early, nothing is known of the memory.
+        let unknown = vec![None; plan.slots.len()];
+        let mut contents = std::mem::replace(&mut *prepared.memo.contents.lock().unwrap_or_else(PoisonError::into_inner), unknown);
+        let mut chosen = vec![false; acts.len()];
+        if !options.keep {
+            chosen[plan.literals.len()..].fill(true);
+        }
+        // What the host takes tile by tile is not there to be taken again.
+        let given = acts.len() - plan.steps.len();
+        plan.steps.iter().zip(&mut chosen[given..]).for_each(|(step, chosen)| *chosen |= matches!(step, Step::Tiles(_)));
+        Course::new(&acts, plan.slots.len()).needed(&mut chosen, &wanted(plan), &mut contents);
+        let (given, steps) = chosen.split_at(given);
+        let (literals, uploads) = given.split_at(plan.literals.len());
+        for ((slot, bytes), _) in plan.literals.iter().zip(literals).filter(|(_, chosen)| **chosen) {
+            let (buffer, all) = (memory(prepared, *slot)?.buffer(&plan.name)?, 0..bytes.len() as u64);
+            self.transfer.upload(&self.device, buffer, bytes, std::slice::from_ref(&all), &patience, &plan.name)?;
+        }
+        for ((upload, source), _) in plan.uploads.iter().zip(&sources).zip(uploads).filter(|(_, chosen)| **chosen) {
             let buffer = memory(prepared, upload.slot)?.buffer(&plan.name)?;
             self.transfer.upload(&self.device, buffer, source, &upload.ranges, &patience, &upload.name)?;
         }
         timings.upload_ms = millis(started);
-        self.histories.recall(&self.device, plan, &prepared.memory);
 
+        self.histories.recall(&self.device, plan, &prepared.memory);
         let run = Running { prepared, options, patience: &patience };
-        for steps in prepared.steps.chunk_by(|a, b| !matches!(a, Ready::Tiles(_)) && !matches!(b, Ready::Tiles(_))) {
+        let chosen: Vec<&Ready> = prepared.steps.iter().zip(steps).filter(|(_, chosen)| **chosen).map(|(step, _)| step).collect();
+        for steps in chosen.chunk_by(|a, b| !matches!(a, Ready::Tiles(_)) && !matches!(b, Ready::Tiles(_))) {
             match steps {
                 [Ready::Tiles(tiles)] => self.tiles(&run, tiles, exchange, &mut timings)?,
-                _ => self.launch(&run, steps, None, &mut timings)?,
+                _ => self.launch(&run, steps.iter().copied(), None, &mut timings)?,
             }
         }
+        timings.passes_run = chosen.len();
+        timings.passes_kept = steps.len() - timings.passes_run;
 
         let started = Instant::now();
         self.histories.keep(&self.device, plan, &prepared.memory)?;
@@ -245,14 +277,15 @@ impl Executor {
             take(Part { name, range: start..start + bytes.len() as u64, bytes });
         })?;
         timings.readback_ms += millis(started);
+        *prepared.memo.contents.lock().unwrap_or_else(PoisonError::into_inner) = contents;
         Ok(timings)
     }
 
     /// Records, submits and waits for steps; `groups` are those of a tile's launches, from an id on.
-    fn launch(
+    fn launch<'s>(
         &mut self,
         run: &Running<'_>,
-        steps: &[Ready],
+        steps: impl Iterator<Item = &'s Ready>,
         groups: Option<(usize, &[[u32; 3]])>,
         timings: &mut Timings,
     ) -> Result<(), GpuError> {
@@ -263,7 +296,9 @@ impl Executor {
         if let Some((first_id, groups)) = groups {
             recorder = recorder.with_groups(first_id, groups);
         }
-        recorder.steps(steps)?;
+        for step in steps {
+            recorder.step(step)?;
+        }
         let (passes, learned) = recorder.finish()?;
         *prepared.costs.lock().unwrap_or_else(PoisonError::into_inner) = learned;
         for (name, ms) in passes {
@@ -293,7 +328,7 @@ impl Executor {
             }
             timings.upload_ms += millis(started);
 
-            self.launch(run, &tiles.body, Some((tiles.first_id, &tile.groups)), timings)?;
+            self.launch(run, tiles.body.iter(), Some((tiles.first_id, &tile.groups)), timings)?;
 
             let started = Instant::now();
             let mut taken: Vec<Vec<u8>> = tile.fetches.iter().map(|to| vec![0; to.bytes() as usize]).collect();
@@ -312,15 +347,6 @@ impl Executor {
         }
         Ok(())
     }
-
-    fn write_literals(&mut self, prepared: &Prepared) -> Result<(), GpuError> {
-        let plan = &prepared.plan;
-        for (slot, bytes) in &plan.literals {
-            let (buffer, all) = (memory(prepared, *slot)?.buffer(&plan.name)?, 0..bytes.len() as u64);
-            self.transfer.upload(&self.device, buffer, bytes, std::slice::from_ref(&all), &Patience::default(), &plan.name)?;
-        }
-        Ok(())
-    }
 }
 
 /// What all parts of a run share.
@@ -331,7 +357,37 @@ struct Running<'a> {
     patience: &'a Patience<'a>,
 }
 
-fn memory(prepared: &Prepared, slot: pipe_plan::plan::SlotId) -> Result<&Memory, GpuError> {
+/// All that a run does, in order: literals, uploads, recalled histories, steps.
+fn acts(plan: &Plan, steps: &[Act], of_upload: impl Fn(&Upload) -> Key) -> Vec<Act> {
+    let literals = plan.literals.iter().map(|(slot, bytes)| Act::fill(*slot, memo::of_bytes(bytes)));
+    let uploads = plan.uploads.iter().map(|upload| Act::fill(upload.slot, of_upload(upload)));
+    let recalled = plan.histories.iter().filter_map(|history| history.recall).map(|slot| Act::fill(slot, memo::unique()));
+    let steps = plan.steps.iter().zip(steps).map(|(step, act)| if matches!(step, Step::Tiles(_)) { act.once() } else { act.clone() });
+    literals.chain(uploads).chain(recalled).chain(steps).collect()
+}
+
+/// The key of what an upload takes from an input.
+fn of_upload(input: Key, upload: &Upload) -> Key {
+    memo::of((input, &upload.ranges))
+}
+
+/// The slots whose content at the end matters.
+fn wanted(plan: &Plan) -> Vec<SlotId> {
+    let fetched = plan.fetches.iter().flat_map(|fetch| fetch.parts.iter().map(|(slot, _)| *slot));
+    fetched.chain(plan.histories.iter().map(|history| history.keep)).collect()
+}
+
+/// The bytes that an upload is made of.
+fn source<'a>(upload: &Upload, inputs: &HashMap<&str, &'a [u8]>) -> Result<&'a [u8], GpuError> {
+    let source = inputs.get(upload.name.as_str()).copied().unwrap_or_default();
+    let wanted = upload.ranges.iter().map(|r| r.end).max().unwrap_or(0);
+    if (source.len() as u64) < wanted {
+        return Err(GpuError::ShortInput { name: upload.name.clone(), got: source.len() as u64, wanted });
+    }
+    Ok(source)
+}
+
+fn memory(prepared: &Prepared, slot: SlotId) -> Result<&Memory, GpuError> {
     let missing = || GpuError::Plan { node: prepared.plan.name.clone(), reason: format!("there is no slot {}", slot.0) };
     prepared.memory.get(slot.0 as usize).ok_or_else(missing)
 }

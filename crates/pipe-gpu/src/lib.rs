@@ -14,6 +14,7 @@ mod error;
 mod execute;
 mod formats;
 mod history;
+mod memo;
 mod patience;
 mod pipelines;
 mod prepare;

@@ -7,6 +7,7 @@ use pipe_plan::plan::{Binding, Launch, Plan, Repeat, Run, SlotId, Step, Tiling, 
 
 use crate::device::Device;
 use crate::error::GpuError;
+use crate::memo::{Act, Key};
 use crate::pipelines::Pipeline;
 use crate::storage::Memory;
 
@@ -20,7 +21,16 @@ pub struct Prepared {
     pub(crate) names: Vec<String>,
     /// What launches cost in earlier runs, so that a later frame is cut into submissions well from its start.
     pub(crate) costs: Mutex<Costs>,
+    pub(crate) memo: Memo,
     pipelines: usize,
+}
+
+/// What makes it possible to leave out parts of a run.
+pub(crate) struct Memo {
+    /// What the plan's steps do.
+    pub(crate) steps: Vec<Act>,
+    /// What each slot holds, as far as that is known.
+    pub(crate) contents: Mutex<Vec<Option<Key>>>,
 }
 
 /// GPU nanoseconds that one launch takes, by [`ReadyRun::id`]: a guess at first, then measured.
@@ -80,6 +90,7 @@ impl Prepared {
         device: &Device,
         plan: Arc<Plan>,
         memory: Vec<Memory>,
+        memo: Memo,
         uniforms: Option<wgpu::Buffer>,
         pipelines: &[Arc<Pipeline>],
     ) -> Result<Self, GpuError> {
@@ -93,7 +104,7 @@ impl Prepared {
         }
         let Maker { names, costs, .. } = maker;
         let pipelines = pipelines.len();
-        Ok(Self { plan, memory, uniforms, steps, names, costs: Mutex::new(Costs(costs)), pipelines })
+        Ok(Self { plan, memory, uniforms, steps, names, costs: Mutex::new(Costs(costs)), memo, pipelines })
     }
 }
 

@@ -107,13 +107,13 @@ impl<'a> Recorder<'a> {
         self
     }
 
-    /// Records steps, submitting as it goes.
-    pub(crate) fn steps(&mut self, steps: &[Ready]) -> Result<(), GpuError> {
-        steps.iter().try_for_each(|step| match step {
+    /// Records a step, submitting as it goes.
+    pub(crate) fn step(&mut self, step: &Ready) -> Result<(), GpuError> {
+        match step {
             Ready::Run(run) => self.run(run),
             Ready::Repeat(repeat) => self.repeat(repeat),
             Ready::Tiles(_) => unreachable!("tiles stand outside all other steps, and are run by the executor"),
-        })
+        }
     }
 
     /// Submits the rest and waits for everything. Answers GPU times where they were measured, and what was learned.
@@ -131,11 +131,12 @@ impl<'a> Recorder<'a> {
         };
         let mut last = 0;
         for i in 0..most {
-            self.steps(match i {
+            let steps = match i {
                 0 => &repeat.first,
                 i if i % 2 == 1 => &repeat.odd,
                 _ => &repeat.even,
-            })?;
+            };
+            steps.iter().try_for_each(|step| self.step(step))?;
             last = i;
             self.progress(i + 1, most);
             if let Some((values, limit, every)) = until

@@ -1,6 +1,6 @@
 //! Slots → textures and buffers, kept for reuse across plans and frames.
 //!
-//! A slot is reused for one that equals it, never for a smaller one: plans of one graph at one size are what comes
+//! A slot is reused for one that holds what it needs or that equals it, never for a smaller one: plans of one graph at one size are what comes
 //! again and again (frames, `watch`), and equal slots make that exact. Everything is checked against the device and
 //! the budget before the first byte is allocated, so a plan that cannot run fails before it slowed anything down.
 
@@ -10,6 +10,7 @@ use wgpu::{BufferUsages, TextureUsages};
 use crate::device::Device;
 use crate::error::{GpuError, size};
 use crate::formats;
+use crate::memo::Key;
 
 /// One physical resource.
 #[derive(Debug, Clone)]
@@ -52,32 +53,53 @@ impl Memory {
 /// Memory that no plan uses at present.
 #[derive(Default)]
 pub(crate) struct Pool {
-    free: Vec<(Slot, bool, Memory)>,
+    free: Vec<Free>,
+}
+
+struct Free {
+    slot: Slot,
+    target: bool,
+    memory: Memory,
+    content: Option<Key>,
+}
+
+impl Free {
+    /// Whether it can do all that a slot must; it may be able to do more.
+    fn serves(&self, slot: &Slot) -> bool {
+        self.slot.storage == slot.storage && self.slot.uploaded >= slot.uploaded && self.slot.fetched >= slot.fetched
+    }
 }
 
 impl Pool {
-    /// Memory for every slot of a plan. What no slot took is freed before anything is allocated.
-    pub(crate) fn take(&mut self, device: &Device, plan: &Plan) -> Result<Vec<Memory>, GpuError> {
-        let mut taken: Vec<Option<Memory>> = Vec::with_capacity(plan.slots.len());
-        for (i, slot) in plan.slots.iter().enumerate() {
-            let found = self.free.iter().position(|(s, t, _)| s == slot && *t == is_target(plan, i));
-            taken.push(found.map(|at| self.free.swap_remove(at).2));
+    /// Memory for every slot of a plan, and what each holds: if possible one of the contents that are `useful` to that
+    /// slot. What no slot took is freed before anything is allocated.
+    pub(crate) fn take(&mut self, device: &Device, plan: &Plan, useful: &[Vec<Key>]) -> Result<(Vec<Memory>, Vec<Option<Key>>), GpuError> {
+        let mut taken: Vec<Option<Free>> = plan.slots.iter().map(|_| None).collect();
+        for by_content in [true, false] {
+            for (i, slot) in plan.slots.iter().enumerate().filter(|(i, _)| taken[*i].is_none()).collect::<Vec<_>>() {
+                let suits = |free: &Free| {
+                    if by_content {
+                        free.serves(slot) && free.content.is_some_and(|key| useful[i].contains(&key))
+                    } else {
+                        free.slot == *slot
+                    }
+                };
+                let fits = |free: &Free| free.target == is_target(plan, i) && suits(free);
+                taken[i] = self.free.iter().position(fits).map(|at| self.free.swap_remove(at));
+            }
         }
         self.free.clear();
-        let mut all = Vec::with_capacity(taken.len());
-        for (i, memory) in taken.into_iter().enumerate() {
-            all.push(match memory {
-                Some(memory) => memory,
-                None => allocate(device, &plan.slots[i], is_target(plan, i), &plan.name)?,
-            });
-        }
-        Ok(all)
+        let one = |(i, free): (usize, Option<Free>)| match free {
+            Some(free) => Ok((free.memory, free.content)),
+            None => Ok((allocate(device, &plan.slots[i], is_target(plan, i), &plan.name)?, None)),
+        };
+        taken.into_iter().enumerate().map(one).collect()
     }
 
-    /// Takes a plan's memory back.
-    pub(crate) fn give(&mut self, plan: &Plan, memory: Vec<Memory>) {
-        for (i, (slot, memory)) in plan.slots.iter().zip(memory).enumerate() {
-            self.free.push((slot.clone(), is_target(plan, i), memory));
+    /// Takes a plan's memory back, with what it holds.
+    pub(crate) fn give(&mut self, plan: &Plan, memory: Vec<Memory>, contents: Vec<Option<Key>>) {
+        for (i, (memory, content)) in memory.into_iter().zip(contents).enumerate() {
+            self.free.push(Free { slot: plan.slots[i].clone(), target: is_target(plan, i), memory, content });
         }
     }
 }

@@ -27,6 +27,9 @@ use crate::schedule::Schedule;
 use crate::window::{Halo, Windows};
 use crate::{Options, PlanError};
 
+/// What a device of unknown memory is taken to have when it is about keeping results.
+const ASSUMED_BUDGET: u64 = 4 << 30;
+
 /// Index of a value.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 struct ValueId(usize);
@@ -99,7 +102,9 @@ pub(crate) fn allocate(name: &str, schedule: Schedule, limits: &Limits, options:
         player.held[names[&id].0].to = end;
     }
     let Player { composer, held, .. } = player;
-    let (slot_of, mut slots) = colour(&held);
+    let naive_bytes = held.iter().map(|h| h.storage.bytes()).sum();
+    let share = !options.keep || naive_bytes > options.budget.or(limits.budget).unwrap_or(ASSUMED_BUDGET) / 2;
+    let (slot_of, mut slots) = colour(&held, share);
     let at = |id: ResourceId| slot_of[names[&id].0];
 
     let mut literals = Vec::new();
@@ -129,7 +134,6 @@ pub(crate) fn allocate(name: &str, schedule: Schedule, limits: &Limits, options:
     let mut writer = Writer { ops: &ops, slot_of: &slot_of, uniforms: Vec::new(), bytes_moved: 0, placed: Vec::new() };
     let steps = writer.steps(drafts);
     let peak_bytes = slots.iter().map(|s| s.storage.bytes()).sum();
-    let naive_bytes = held.iter().map(|h| h.storage.bytes()).sum();
     check(&ops, &held, &slots, limits, options)?;
     Ok(Plan {
         name: name.to_owned(),
@@ -237,8 +241,8 @@ fn storage(shape: Shape, limits: &Limits) -> Storage {
     }
 }
 
-/// Interval colouring: a slot for each value.
-fn colour(held: &[Held]) -> (Vec<SlotId>, Vec<Slot>) {
+/// Interval colouring: a slot for each value, of its own unless values may share.
+fn colour(held: &[Held], share: bool) -> (Vec<SlotId>, Vec<Slot>) {
     let mut order: Vec<usize> = (0..held.len()).collect();
     order.sort_by_key(|i| (held[*i].from, *i));
     let mut slots: Vec<(Slot, usize)> = Vec::new();
@@ -246,7 +250,7 @@ fn colour(held: &[Held]) -> (Vec<SlotId>, Vec<Slot>) {
     for i in order {
         let value = &held[i];
         // The slot freed last: its content is most likely still in a cache.
-        let free = slots.iter().enumerate().filter(|(_, (slot, until))| slot.storage == value.storage && *until < value.from);
+        let free = slots.iter().enumerate().filter(|(_, (slot, until))| share && slot.storage == value.storage && *until < value.from);
         let found = free.max_by_key(|(id, (_, until))| (*until, usize::MAX - id)).map(|(id, _)| id);
         let id = found.unwrap_or_else(|| {
             slots.push((Slot { storage: value.storage, uploaded: false, fetched: false }, 0));

@@ -40,11 +40,14 @@ pub struct Options {
     pub budget: Option<u64>,
     /// Makes what can be made so in tiles of this size, whether or not it fits whole.
     pub tile: Option<[u32; 2]>,
+    /// Give every value a slot of its own where half of the budget is enough for that, so that what one run made is
+    /// still there in the next.
+    pub keep: bool,
 }
 
 impl Default for Options {
     fn default() -> Self {
-        Self { fuse: true, budget: None, tile: None }
+        Self { fuse: true, budget: None, tile: None, keep: false }
     }
 }
 

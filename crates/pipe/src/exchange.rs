@@ -3,11 +3,11 @@
 use std::collections::HashMap;
 use std::ops::Range;
 
-use indexmap::IndexMap;
 use pipe_gpu::{Exchange, Rows};
 use pipe_io::{ReadAhead, WriteBehind};
 use pipe_plan::plan::{Crossing, Plan, Rect};
 
+use crate::Failure;
 use crate::run::{Decoded, Inputs};
 
 /// An output whose tiles arrive.
@@ -32,7 +32,7 @@ pub(crate) struct Arrived {
 
 /// The pictures of a run.
 pub(crate) struct Pictures<'a> {
-    inputs: IndexMap<&'a str, Source<'a>>,
+    inputs: HashMap<&'a str, Source<'a>>,
     outputs: HashMap<String, Arriving>,
 }
 
@@ -43,18 +43,23 @@ enum Source<'a> {
 }
 
 impl<'a> Pictures<'a> {
-    /// Takes the tiles of a plan from these pictures; those that are files yet are read now, and are spent.
-    pub(crate) fn of(inputs: impl Iterator<Item = &'a mut Inputs>, plan: &Plan) -> Self {
-        let source = |name: &str, decoded: &'a mut Decoded| match decoded {
-            Decoded::Picture(p) => Some(Source::Memory { bytes: &p.bytes, rows: 0..p.height }),
-            Decoded::Distant(reader) => {
-                let bands = reader.take()?.ahead(bands(plan, name));
-                Some(Source::File { bands, rows: 0..0, band: Vec::new() })
+    /// Takes the tiles of a plan from these pictures; those that are still files begin to be read now.
+    pub(crate) fn of(inputs: &'a Inputs, plan: &Plan) -> Result<Self, Failure> {
+        let mut sources = HashMap::new();
+        for (name, decoded) in inputs {
+            match &**decoded {
+                Decoded::Picture(p) => drop(sources.insert(name.as_str(), Source::Memory { bytes: &p.bytes, rows: 0..p.height })),
+                Decoded::Distant(distant) => {
+                    let bands = bands(plan, name);
+                    if !bands.is_empty() {
+                        let bands = distant.rows()?.ahead(bands);
+                        sources.insert(name.as_str(), Source::File { bands, rows: 0..0, band: Vec::new() });
+                    }
+                }
+                Decoded::Volume(_) | Decoded::Table(_) => {}
             }
-            Decoded::Volume(_) | Decoded::Table(_) => None,
-        };
-        let all = inputs.flat_map(|inputs| inputs.iter_mut());
-        Self { inputs: all.filter_map(|(name, d)| Some((name.as_str(), source(name, d)?))).collect(), outputs: HashMap::new() }
+        }
+        Ok(Self { inputs: sources, outputs: HashMap::new() })
     }
 
     /// Puts the tiles of one more plane of an output together, in a file or in memory.

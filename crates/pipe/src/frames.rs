@@ -1,8 +1,8 @@
 //! Sequences: every frame through the same graph, decode, GPU and encode overlapping.
 //!
 //! One thread decodes the frames ahead, this one runs them, one encodes those that are done; at most two frames wait
-//! between them, so memory is bounded. The session keeps pipelines, memory and staging over all frames. An output that is
-//! one file of a format that moves (APNG, GIF) holds all frames.
+//! between them, so memory is bounded. The session keeps pipelines, memory and staging over all frames; an input that is the
+//! same file in every frame is decoded once, and what is made of it alone stays on the device. An output that is one file of a format that moves (APNG, GIF) holds all frames.
 
 use std::collections::HashMap;
 use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
@@ -14,8 +14,9 @@ use pipe_io::{Animation, Format, Target};
 use pipe_plan::lower::Rim;
 
 use crate::Failure;
+use crate::decode::Decoder;
 use crate::project::{Project, World};
-use crate::run::{Finished, Inputs, Job, Report, Session, decode, input_kinds, make_plan};
+use crate::run::{Finished, Inputs, Job, Report, Session, input_kinds, make_plan};
 
 /// Which frames, and what to do about bad ones.
 #[derive(Debug, Clone, Copy)]
@@ -43,6 +44,10 @@ pub struct Outcome {
 fn at_frame(job: &Job, frame: u32) -> Result<Job, Failure> {
     let mut job = job.clone();
     job.frame = f64::from(frame);
+    // Where every input is another one in each frame, there is next to nothing to keep.
+    let moves = |file: &String| Ok::<bool, Failure>(Pattern::parse(file)?.is_some());
+    let moving = job.inputs.values().map(moves).collect::<Result<Vec<bool>, _>>()?;
+    job.keep = moving.is_empty() || moving.contains(&false);
     let files = job.inputs.values_mut().chain(job.outputs.values_mut()).chain(job.dumps.values_mut());
     for file in files {
         if let Some(pattern) = Pattern::parse(file)? {
@@ -55,7 +60,7 @@ fn at_frame(job: &Job, frame: u32) -> Result<Job, Failure> {
 /// Whether frames need the ones before them: whether a plan for inputs of some size keeps anything.
 fn remembers(project: &mut Project, session: &Session, job: &Job) -> bool {
     let request = Request { settings: job.settings.clone(), frame: job.frame, ..Request::default() };
-    let graph = project.resolve(&request, &World { read: job.read });
+    let graph = project.resolve(&request, &World::new(job.read));
     // Histories are those of the outputs that are asked for, and those are what a later frame has.
     let plan = graph.and_then(|graph| make_plan(&graph, &Rim::default(), &session.limits(), job).ok());
     plan.is_some_and(|plan| !plan.histories.is_empty())
@@ -122,12 +127,13 @@ pub fn run_sequence(
         let (finished_tx, finished_rx) = sync_channel::<(u32, Finished)>(1);
         let kinds = &kinds;
         scope.spawn(move || {
+            let mut decoder = Decoder::default();
             for frame in frames {
-                let read = || -> Result<(Job, Option<Inputs>), Failure> {
+                let mut read = || -> Result<(Job, Option<Inputs>), Failure> {
                     let job = at_frame(job, frame)?;
                     let done =
                         sequence.resume && !job.outputs.is_empty() && job.outputs.values().all(|f| std::path::Path::new(f).is_file());
-                    let inputs = if done { None } else { Some(decode(&job, kinds)?) };
+                    let inputs = if done { None } else { Some(decoder.inputs(&job, kinds)?) };
                     Ok((job, inputs))
                 };
                 if cancel.load(Ordering::Relaxed) || decoded_tx.send((frame, read())).is_err() {
@@ -157,9 +163,9 @@ pub fn run_sequence(
             }
             let ran = read.and_then(|(mut job, inputs)| match inputs {
                 None => Ok(None),
-                Some(mut inputs) => {
+                Some(inputs) => {
                     job.frames_before = before;
-                    session.execute(&job, &mut inputs, Some(cancel), None).map(Some)
+                    session.execute(&job, &inputs, Some(cancel), None).map(Some)
                 }
             });
             match ran {

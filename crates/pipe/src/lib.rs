@@ -16,6 +16,7 @@
 //! ```
 
 pub mod compare;
+pub mod decode;
 mod exchange;
 mod failure;
 mod forms;

@@ -1,6 +1,8 @@
 //! A graph file on its way to a [`Graph`]: reading, checking, and saying all that is wrong.
 
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex, PoisonError};
 
 use pipe_graph::diagnostic::{Diagnostics, Sources};
 use pipe_graph::document::{Document, parse};
@@ -19,10 +21,29 @@ const STACK: usize = 512 << 20;
 pub struct World {
     /// How image files are opened.
     pub read: pipe_io::ReadOptions,
+    /// What was asked for.
+    asked: Arc<Mutex<BTreeSet<PathBuf>>>,
+}
+
+impl World {
+    /// A world in which image files are opened like this.
+    pub fn new(read: pipe_io::ReadOptions) -> Self {
+        Self { read, ..Self::default() }
+    }
+
+    /// Every file that was asked for so far, whether it was there or not.
+    pub fn files(&self) -> BTreeSet<PathBuf> {
+        self.asked.lock().unwrap_or_else(PoisonError::into_inner).clone()
+    }
+
+    fn note(&self, path: &Path) {
+        self.asked.lock().unwrap_or_else(PoisonError::into_inner).insert(path.to_owned());
+    }
 }
 
 impl Loader for World {
     fn text(&self, path: &Path) -> Result<String, String> {
+        self.note(path);
         match std::fs::read(path) {
             Ok(bytes) => String::from_utf8(bytes).map_err(|_| format!("{} is no text", path.display())),
             Err(e) => {
@@ -34,16 +55,20 @@ impl Loader for World {
     }
 
     fn image(&self, path: &Path) -> Result<ImageType, String> {
-        let header = pipe_io::probe(&pipe_io::Source::parse(&path.to_string_lossy()), &self.read).map_err(|e| e.to_string())?;
+        let source = pipe_io::Source::parse(&path.to_string_lossy());
+        self.note(source.path.as_deref().unwrap_or(path));
+        let header = pipe_io::probe(&source, &self.read).map_err(|e| e.to_string())?;
         Ok(ImageType::new([header.width, header.height], forms::image_channels(header.channels)))
     }
 
     fn volume(&self, path: &Path) -> Result<VolumeType, String> {
         let source = pipe_io::Source::parse(&path.to_string_lossy());
+        self.note(source.path.as_deref().unwrap_or(path));
         pipe_io::volume::probe(&source, &self.read.limits).map(|header| forms::volume_type(&header)).map_err(|e| e.to_string())
     }
 
     fn table(&self, path: &Path) -> Result<TableFile, String> {
+        self.note(path);
         match pipe_io::table::read(path).map_err(|e| e.to_string())? {
             pipe_io::table::Table::Float(v) => Ok(TableFile::F32(v)),
             pipe_io::table::Table::Uint(v) => Ok(TableFile::U32(v)),

@@ -4,7 +4,7 @@
 //! temporary file that is renamed at the end; so a run that fails leaves every old file as it was.
 
 use std::borrow::Cow;
-use std::collections::HashMap;
+use std::collections::{BTreeSet, HashMap};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
@@ -13,17 +13,18 @@ use std::time::{Duration, Instant};
 use indexmap::IndexMap;
 use pipe_gpu::{Choice, Device, Executor, Outputs, Prepared, RunOptions};
 use pipe_graph::graph::{Graph, Instance, Work};
-use pipe_graph::node::{FileSource, ReadbackFile};
+use pipe_graph::node::ReadbackFile;
 use pipe_graph::pass::Limits;
 use pipe_graph::resolve::Request;
 use pipe_graph::types::{EdgeKind, EdgeType, Element, ImageType, VolumeType};
 use pipe_io::mesh::Mesh;
 use pipe_io::table::Table;
 use pipe_io::volume::{Volume, VolumeHeader, Voxel};
-use pipe_io::{Animation, Channels, Header, Metadata, Picture, ReadOptions, RowReader, RowWriter, Source, Target, WriteBehind, WriteOptions};
-use pipe_plan::lower::{Rim, file_name, readback_name};
+use pipe_io::{Animation, Channels, Metadata, Picture, ReadOptions, RowWriter, Target, WriteBehind, WriteOptions};
+use pipe_plan::lower::{Rim, readback_name};
 use pipe_plan::{Options, Plan};
 
+use crate::decode::{self, Decoder, Distant};
 use crate::exchange::Pictures;
 use crate::project::{Project, World};
 use crate::{Failure, forms, readback};
@@ -72,6 +73,9 @@ pub struct Job {
     pub rate: f64,
     /// Frames that this session ran before, for `Feedback`.
     pub frames_before: u32,
+    /// Keep results on the device, as far as half of the budget goes, and leave out what a later run of the session
+    /// finds there.
+    pub keep: bool,
 }
 
 impl Job {
@@ -94,6 +98,7 @@ impl Job {
             frame: 1.0,
             rate: 24.0,
             frames_before: 0,
+            keep: false,
         }
     }
 
@@ -141,6 +146,10 @@ pub struct Report {
     pub wall: Wall,
     /// GPU time by pass, when it was measured.
     pub passes: IndexMap<String, f64>,
+    /// How many passes ran.
+    pub passes_run: usize,
+    /// How many did not, since the device still held what they make.
+    pub passes_kept: usize,
     /// Bytes that the plan's slots take.
     pub peak_bytes: u64,
     /// Warnings about the graph, rendered.
@@ -150,7 +159,7 @@ pub struct Report {
 }
 
 impl Report {
-    /// `--stats`: `{device, size, readbacks, timings, peak_bytes}`.
+    /// `--stats`: `{device, size, readbacks, timings, passes, passes_run, passes_kept, peak_bytes}`.
     pub fn to_json(&self) -> serde_json::Value {
         serde_json::json!({
             "device": self.device,
@@ -158,6 +167,8 @@ impl Report {
             "readbacks": self.readbacks,
             "timings": self.wall,
             "passes": self.passes,
+            "passes_run": self.passes_run,
+            "passes_kept": self.passes_kept,
             "peak_bytes": self.peak_bytes,
         })
     }
@@ -167,8 +178,8 @@ impl Report {
 pub enum Decoded {
     /// An image.
     Picture(Picture),
-    /// An image so large that its rows are better decoded when they are needed; `None` once they were.
-    Distant(Option<RowReader>),
+    /// An image so large that its rows are better decoded when they are needed.
+    Distant(Distant),
     /// A volume.
     Volume(Volume),
     /// A table.
@@ -176,21 +187,6 @@ pub enum Decoded {
 }
 
 impl Decoded {
-    /// Decodes a picture of which only the header was read.
-    fn bring(&mut self) -> Result<(), Failure> {
-        if let Self::Distant(reader) = self
-            && let Some(mut reader) = reader.take()
-        {
-            let (w, h) = (reader.header().width, reader.header().height);
-            let mut bytes = Vec::new();
-            reader.read(0..h, &mut bytes)?;
-            let Header { sample, channels, alpha, colour, metadata, .. } = reader.header().clone();
-            let layout = reader.layout();
-            *self = Self::Picture(Picture { width: w, height: h, sample, layout, channels, alpha, colour, bytes, metadata });
-        }
-        Ok(())
-    }
-
     fn bytes(&self) -> Cow<'_, [u8]> {
         match self {
             Self::Picture(p) => Cow::Borrowed(&p.bytes),
@@ -204,9 +200,8 @@ impl Decoded {
     fn ty(&self) -> EdgeType {
         match self {
             Self::Picture(p) => EdgeType::Image(ImageType::new([p.width, p.height], forms::image_channels(p.channels))),
-            Self::Distant(None) => unreachable!("a file that was read row by row is not read again"),
-            Self::Distant(Some(r)) => {
-                let header = r.header();
+            Self::Distant(d) => {
+                let header = &d.header;
                 EdgeType::Image(ImageType::new([header.width, header.height], forms::image_channels(header.channels)))
             }
             Self::Volume(v) => EdgeType::Volume(forms::volume_type(&v.header)),
@@ -217,45 +212,12 @@ impl Decoded {
 }
 
 /// All inputs of one frame, by graph input and by [`file_name`] of files that nodes read.
-pub type Inputs = IndexMap<String, Decoded>;
-
-/// Bytes of pixels from which on a picture is read row by row, if its plan allows: a picture of this size costs more time
-/// to decode than opening a device takes.
-const LARGE: u64 = 1 << 30;
-
-/// A picture, or only its header where it is large.
-fn picture(file: &str, job: &Job) -> Result<Decoded, Failure> {
-    let source = Source::parse(file);
-    // A stream can be read once only, and is held anyway.
-    if source.path.is_some() {
-        let header = pipe_io::probe(&source, &job.read);
-        let bytes = |h: &Header| u64::from(h.width) * u64::from(h.height) * h.channels.count() as u64 * h.sample.bytes() as u64;
-        let large = |bytes: u64| bytes >= LARGE || job.budget.is_some_and(|budget| bytes >= budget / 4);
-        if header.as_ref().map_or(true, |h| large(bytes(h))) {
-            return Ok(Decoded::Distant(Some(RowReader::open(&source, &job.read)?)));
-        }
-    }
-    Ok(Decoded::Picture(pipe_io::read(&source, &job.read)?))
-}
-
-/// Reads every input file of a job.
-pub fn decode(job: &Job, kinds: &HashMap<String, EdgeKind>) -> Result<Inputs, Failure> {
-    let mut inputs = Inputs::new();
-    for (name, file) in &job.inputs {
-        let value = match kinds.get(name) {
-            Some(EdgeKind::Table) => Decoded::Table(pipe_io::table::read(Path::new(file))?),
-            Some(EdgeKind::Volume) => Decoded::Volume(pipe_io::volume::read(&Source::parse(file), &job.read.limits)?),
-            _ => picture(file, job)?,
-        };
-        inputs.insert(name.clone(), value);
-    }
-    Ok(inputs)
-}
+pub type Inputs = IndexMap<String, Arc<Decoded>>;
 
 /// What comes out of a run before it is written.
 pub struct Finished {
     images: Vec<(Target, Picture)>,
-    /// Files that all rows were written to, and that appear at the end.
+    /// Files that all rows were given to, and that appear at the end.
     written: Vec<WriteBehind>,
     volumes: Vec<(PathBuf, Volume)>,
     meshes: Vec<(PathBuf, Mesh)>,
@@ -282,8 +244,8 @@ impl Finished {
             let options = WriteOptions { channels: Some(picture.channels), ..self.write.clone() };
             pipe_io::write(target, picture, &options)?;
         }
-        for writer in self.written {
-            writer.finish()?;
+        for file in self.written {
+            file.finish()?;
         }
         for (path, volume) in &self.volumes {
             pipe_io::volume::write(path, volume)?;
@@ -304,12 +266,22 @@ impl Finished {
 pub struct Session {
     executor: Executor,
     prepared: Option<Prepared>,
+    inputs: Decoder,
+    /// Files that nodes read.
+    files: Decoder,
+    seen: BTreeSet<PathBuf>,
 }
 
 impl Session {
     /// Opens a device; `cache` is a folder for compiled pipelines.
     pub fn open(choice: &Choice, cache: Option<&Path>) -> Result<Self, Failure> {
-        Ok(Self { executor: Executor::new(Device::open(choice)?, cache), prepared: None })
+        let executor = Executor::new(Device::open(choice)?, cache);
+        Ok(Self { executor, prepared: None, inputs: Decoder::default(), files: Decoder::default(), seen: BTreeSet::new() })
+    }
+
+    /// The files that the last run looked at, whether it succeeded or not: the graph, what it includes, inputs.
+    pub fn files(&self) -> &BTreeSet<PathBuf> {
+        &self.seen
     }
 
     /// The device's name.
@@ -330,10 +302,14 @@ impl Session {
     /// Runs a job from files to files.
     pub fn run(&mut self, job: &Job) -> Result<Report, Failure> {
         let started = Instant::now();
+        self.seen = BTreeSet::from([PathBuf::from(&job.graph)]);
         let kinds = input_kinds(&mut Project::open(&job.graph)?);
-        let mut inputs = decode(job, &kinds)?;
+        // An input that is overwritten changes because of the run.
+        let kept = job.inputs.iter().filter(|(_, file)| job.outputs.values().all(|out| out != *file));
+        self.seen.extend(kept.filter_map(|(name, file)| decode::path(file, *kinds.get(name)?)));
+        let inputs = self.inputs.inputs(job, &kinds)?;
         let decoded = millis(started);
-        let mut finished = self.execute(job, &mut inputs, None, None)?;
+        let mut finished = self.execute(job, &inputs, None, None)?;
         finished.report.wall.decode = decoded;
         finished.report.wall.total += decoded;
         finished.write()
@@ -343,29 +319,26 @@ impl Session {
     pub fn execute(
         &mut self,
         job: &Job,
-        inputs: &mut Inputs,
+        inputs: &Inputs,
         cancel: Option<&AtomicBool>,
         progress: Option<&(dyn Fn(u32, u32) + Sync)>,
     ) -> Result<Finished, Failure> {
         let started = Instant::now();
         let mut project = Project::open(&job.graph)?;
-        let world = World { read: job.read };
+        let world = World::new(job.read);
         let request = request(job, inputs);
-        let Some(graph) = project.resolve(&request, &world) else { return Err(project.failure(false)) };
-        let mut files = read_files(&graph, job)?;
+        let graph = project.resolve(&request, &world);
+        self.seen.extend(world.files());
+        let Some(graph) = graph else { return Err(project.failure(false)) };
+        let mut files = self.files.files_of(&graph, &job.read, job.budget)?;
         let (rim, outputs) = rim(job, &graph, inputs, &files)?;
         let plan = Arc::new(make_plan(&graph, &rim, &self.limits(), job)?);
-        // What is needed whole is decoded whole.
-        for (name, decoded) in inputs.iter_mut().chain(&mut files) {
-            if plan.uploads.iter().any(|upload| upload.name == *name) {
-                decoded.bring()?;
-            }
-        }
         self.prepare(&plan)?;
+        files.extend(inputs.iter().map(|(name, input)| (name.clone(), input.clone())));
         let planned = millis(started);
 
-        let options = RunOptions { timeout: job.timeout, profile: job.profile, cancel, progress };
-        let (mut ran, mut files_of) = self.launch(job, &plan, &outputs, [inputs, &mut files], &options)?;
+        let options = RunOptions { timeout: job.timeout, profile: job.profile, cancel, progress, keep: job.keep };
+        let (mut ran, mut filled) = self.launch(job, &plan, &outputs, files, &options)?;
 
         let mut report = Report {
             device: self.device_name().to_owned(),
@@ -373,6 +346,8 @@ impl Session {
             warnings: project.render(false),
             peak_bytes: plan.peak_bytes,
             passes: std::mem::take(&mut ran.timings.passes),
+            passes_run: ran.timings.passes_run,
+            passes_kept: ran.timings.passes_kept,
             ..Report::default()
         };
         report.wall.plan = planned;
@@ -393,7 +368,7 @@ impl Session {
         }
         let (mut images, mut volumes, mut meshes, mut written) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
         for output in outputs {
-            if let Some(file) = files_of.remove(&output.name) {
+            if let Some(file) = filled.remove(&output.name) {
                 written.push(file);
                 continue;
             }
@@ -419,26 +394,24 @@ impl Session {
         Ok(Finished { images, written, volumes, meshes, data, report, write: job.write.clone() })
     }
 
-    /// Runs the prepared plan. Outputs that are made tile by tile go straight into their files.
+    /// Runs the prepared plan. Outputs that are made tile by tile go straight into their files, which are answered.
     fn launch(
         &mut self,
         job: &Job,
         plan: &Plan,
         outputs: &[Output],
-        [inputs, files]: [&mut Inputs; 2],
+        mut inputs: Inputs,
         options: &RunOptions<'_>,
     ) -> Result<(Outputs, HashMap<String, WriteBehind>), Failure> {
-        let prepared = self.prepared.as_ref().expect("a plan is prepared before it runs");
-        if plan.tilings().next().is_none() {
-            let held: HashMap<&str, Cow<'_, [u8]>> = inputs.iter().chain(&*files).map(|(n, d)| (n.as_str(), d.bytes())).collect();
-            let given: HashMap<&str, &[u8]> = held.iter().map(|(n, b)| (*n, b.as_ref())).collect();
-            return Ok((self.executor.run(prepared, &given, options)?, HashMap::new()));
+        // What is needed whole is decoded whole.
+        for (name, decoded) in &mut inputs {
+            if let (true, Decoded::Distant(distant)) = (plan.uploads.iter().any(|u| u.name == *name), &**decoded) {
+                *decoded = Arc::new(Decoded::Picture(distant.picture()?));
+            }
         }
-        let needed = |name: &str| plan.uploads.iter().any(|u| u.name == name);
-        let held: HashMap<String, Vec<u8>> =
-            inputs.iter().chain(&*files).filter(|(n, _)| needed(n)).map(|(n, d)| (n.clone(), d.bytes().into_owned())).collect();
-        let given: HashMap<&str, &[u8]> = held.iter().map(|(n, b)| (n.as_str(), b.as_slice())).collect();
-        let mut pictures = Pictures::of([inputs, files].into_iter(), plan);
+        let held: HashMap<&str, Cow<'_, [u8]>> = inputs.iter().map(|(n, d)| (n.as_str(), d.bytes())).collect();
+        let given: HashMap<&str, &[u8]> = held.iter().map(|(n, b)| (*n, b.as_ref())).collect();
+        let mut pictures = Pictures::of(&inputs, plan)?;
         for fetch in plan.tilings().flat_map(|t| t.tiles.first()).flat_map(|t| &t.fetches) {
             let image = outputs.iter().find(|o| o.name == fetch.name).and_then(|o| match &o.to {
                 Packed::Image { target, form, size } if !target.format.moves() => Some((target, form, size, &o.metadata)),
@@ -446,10 +419,12 @@ impl Session {
             });
             let file = image.filter(|_| fetch.plane == 0).map(|(target, form, [w, h], metadata)| {
                 let picture = form.picture(*w, *h, Vec::new(), metadata.clone().unwrap_or_default());
-                RowWriter::create(target, &picture, &WriteOptions { channels: Some(picture.channels), ..job.write.clone() }).map(RowWriter::behind)
+                let write = WriteOptions { channels: Some(picture.channels), ..job.write.clone() };
+                RowWriter::create(target, &picture, &write).map(RowWriter::behind)
             });
             pictures.collect(&fetch.name, file.transpose()?);
         }
+        let prepared = self.prepared.as_ref().expect("a plan is prepared before it runs");
         let mut ran = self.executor.run_through(prepared, &given, &mut pictures, options)?;
         let arrived = pictures.arrived();
         ran.fetched.extend(arrived.bytes);
@@ -482,7 +457,7 @@ pub fn input_kinds(project: &mut Project) -> HashMap<String, EdgeKind> {
 
 /// What the resolver must know of a job.
 pub fn request(job: &Job, inputs: &Inputs) -> Request {
-    let spacing = |(name, value): (&String, &Decoded)| match value {
+    let spacing = |(name, value): (&String, &Arc<Decoded>)| match &**value {
         Decoded::Volume(volume) => Some((name.clone(), volume.header.spacing)),
         _ => None,
     };
@@ -494,33 +469,6 @@ pub fn request(job: &Job, inputs: &Inputs) -> Request {
         frame: job.frame,
         time: (job.frame - 1.0) / job.rate,
     }
-}
-
-/// Files that nodes of the graph read.
-fn read_files(graph: &Graph, job: &Job) -> Result<Inputs, Failure> {
-    let mut files = Inputs::new();
-    let mut open: Vec<&Graph> = vec![graph];
-    while let Some(graph) = open.pop() {
-        for (_, instance) in graph.iter() {
-            match &instance.work {
-                Work::Node(node) => {
-                    let Some(source) = node.file() else { continue };
-                    let name = file_name(&source);
-                    if files.contains_key(&name) {
-                        continue;
-                    }
-                    let decoded = match &source {
-                        FileSource::Image(path) => picture(path, job)?,
-                        FileSource::Volume(path) => Decoded::Volume(pipe_io::volume::read(&Source::parse(path), &job.read.limits)?),
-                    };
-                    files.insert(name, decoded);
-                }
-                Work::Iterate(iteration) => open.push(&iteration.body),
-                _ => {}
-            }
-        }
-    }
-    Ok(files)
 }
 
 /// A fetched output on its way to a file.
@@ -541,20 +489,20 @@ enum Packed {
 fn rim(job: &Job, graph: &Graph, inputs: &Inputs, files: &Inputs) -> Result<(Rim, Vec<Output>), Failure> {
     let mut rim = Rim { frames_before: job.frames_before, seed: job.seed, ..Rim::default() };
     for (name, value) in inputs.iter().chain(files) {
-        match value {
+        match &**value {
             Decoded::Picture(p) => drop(rim.inputs.insert(name.clone(), forms::of_picture(p))),
-            Decoded::Distant(Some(r)) => drop(rim.inputs.insert(name.clone(), forms::of_header(r.header(), r.layout()))),
+            Decoded::Distant(d) => drop(rim.inputs.insert(name.clone(), forms::of_header(&d.header, d.layout))),
             Decoded::Volume(v) => drop(rim.volumes.insert(name.clone(), forms::of_volume(&v.header))),
-            Decoded::Table(_) | Decoded::Distant(None) => {}
+            Decoded::Table(_) => {}
         }
     }
     let all_inputs = || inputs.values().chain(files.values());
-    let first = all_inputs().find_map(|d| match d {
+    let first = all_inputs().find_map(|d| match &**d {
         Decoded::Picture(p) => Some(&p.metadata),
-        Decoded::Distant(Some(r)) => Some(&r.header().metadata),
-        _ => None,
+        Decoded::Distant(d) => Some(&d.header.metadata),
+        Decoded::Volume(_) | Decoded::Table(_) => None,
     });
-    let first_volume = all_inputs().find_map(|d| if let Decoded::Volume(v) = d { Some(&v.header) } else { None });
+    let first_volume = all_inputs().find_map(|d| if let Decoded::Volume(v) = &**d { Some(&v.header) } else { None });
     let mut outputs = Vec::new();
     let named = graph.outputs().map(|(n, v)| (n.to_owned(), v));
     let asked: Vec<_> = named.filter_map(|(n, v)| Some((job.outputs.get(&n)?.clone(), n, v))).collect();
@@ -664,5 +612,6 @@ pub fn make_plan(graph: &Graph, rim: &Rim, limits: &Limits, job: &Job) -> Result
         let name = fetch.split_once('.').map_or(fetch, |(name, _)| name);
         job.outputs.contains_key(name) || !graph.outputs().any(|(n, _)| n == name)
     };
-    Ok(pipe_plan::plan_graph(graph, rim, limits, &Options { fuse: job.fuse, budget: job.budget, tile: None }, &wanted)?)
+    let options = Options { fuse: job.fuse, budget: job.budget, keep: job.keep, ..Options::default() };
+    Ok(pipe_plan::plan_graph(graph, rim, limits, &options, &wanted)?)
 }

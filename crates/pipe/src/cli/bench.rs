@@ -1,6 +1,7 @@
 //! `bench`: GPU time, bytes and share of the measured copy bandwidth of every pass.
 
 use std::fmt::Write as _;
+use std::sync::Arc;
 
 use indexmap::IndexMap;
 use pipe::Failure;
@@ -48,7 +49,7 @@ fn one(session: &mut Session, a: &BenchArgs, size: [u32; 2]) -> Result<Value, Fa
             Some(EdgeKind::Volume) => Decoded::Volume(test_volume(size)),
             _ => return Err(Failure::Graph(format!("bench makes images and volumes only; input `{}` is neither", input.name.value))),
         };
-        inputs.insert(input.name.value.clone(), made);
+        inputs.insert(input.name.value.clone(), Arc::new(made));
     }
     let Some(graph) = project.resolve(&request(&job, &inputs), &World::default()) else { return Err(project.failure(colour())) };
     for (name, value) in graph.outputs() {
@@ -64,7 +65,7 @@ fn one(session: &mut Session, a: &BenchArgs, size: [u32; 2]) -> Result<Value, Fa
     let copy_gb_s = session.copy_bandwidth(size)?;
     let mut reports: Vec<Report> = Vec::new();
     for run in 0..=a.runs.max(1) {
-        let report = session.execute(&job, &mut inputs, None, None)?.report;
+        let report = session.execute(&job, &inputs, None, None)?.report;
         // The first run compiles and allocates.
         if run > 0 {
             reports.push(report);

@@ -6,9 +6,10 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
 use pipe::Failure;
+use pipe::decode::Decoder;
 use pipe::frames::{Sequence, run_sequence};
 use pipe::project::Project;
-use pipe::run::{Job, Report, Session, decode, input_kinds};
+use pipe::run::{Job, Report, Session, input_kinds};
 use pipe_graph::document::Document;
 use pipe_io::atomic::AtomicFile;
 use pipe_io::mesh::MeshFormat;
@@ -59,17 +60,17 @@ pub(super) fn run(a: &RunArgs) -> Result<(), Failure> {
             // The device opens while the inputs are decoded.
             let (session, inputs) = std::thread::scope(|scope| {
                 let opening = scope.spawn(|| Session::open(&choice, cache.as_deref()));
-                let inputs = decode(&job, &kinds);
+                let inputs = Decoder::default().inputs(&job, &kinds);
                 (opening.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic)), inputs)
             });
-            let (mut session, mut inputs) = (session?, inputs?);
+            let (mut session, inputs) = (session?, inputs?);
             let decoded = started.elapsed().as_secs_f64() * 1e3;
             let bar = output::progress(1, "iterations");
             let tell = |done: u32, of: u32| {
                 bar.set_length(of.into());
                 bar.set_position(done.into());
             };
-            let finished = session.execute(&job, &mut inputs, Some(&cancel), Some(&tell));
+            let finished = session.execute(&job, &inputs, Some(&cancel), Some(&tell));
             bar.finish_and_clear();
             let mut finished = finished?;
             finished.report.wall.decode = decoded;
@@ -192,7 +193,7 @@ fn check_early(project: &mut Project, job: &Job) -> Result<(), Failure> {
         }
     }
     let request = pipe_graph::resolve::Request { settings: job.settings.clone(), frame: job.frame, ..Default::default() };
-    let world = pipe::project::World { read: job.read };
+    let world = pipe::project::World::new(job.read);
     // Sizes are unknown here, so only what is wrong at any size may end the run; sizes are checked with the pixels.
     if job.inputs.is_empty() || project.diagnostics.has_errors() {
         project.resolve(&request, &world);
@@ -218,10 +219,10 @@ fn frames(a: &RunArgs, job: &Job) -> Result<Option<FrameRange>, Failure> {
     }
 }
 
-fn describe(r: &Report) -> String {
+pub(super) fn describe(r: &Report) -> String {
     let w = &r.wall;
     format!(
-        "{} on {}: decode {:.0} ms, plan {:.0}, upload {:.0}, compute {:.0}, readback {:.0}, encode {:.0}, all {:.0} ms; {:.1} MiB on the device",
+        "{} on {}: decode {:.0} ms, plan {:.0}, upload {:.0}, compute {:.0}, readback {:.0}, encode {:.0}, all {:.0} ms; {}; {:.1} MiB on the device",
         r.size.iter().map(u32::to_string).collect::<Vec<_>>().join("x"),
         r.device,
         w.decode,
@@ -231,8 +232,17 @@ fn describe(r: &Report) -> String {
         w.readback,
         w.encode,
         w.total,
+        passes(r),
         r.peak_bytes as f64 / f64::from(1 << 20)
     )
+}
+
+/// How many passes ran, and how many did not have to.
+pub(super) fn passes(r: &Report) -> String {
+    match (r.passes_run, r.passes_kept) {
+        (run, 0) => format!("{run} passes ran"),
+        (run, kept) => format!("{run} of {} passes ran, {kept} kept", run + kept),
+    }
 }
 
 fn write_reports(a: &RunArgs, report: &Report) -> Result<(), Failure> {

@@ -1,67 +1,72 @@
-//! `watch`: run again on every save of the graph, its shaders or its inputs.
+//! `watch`: run again on every save of the graph, of what it includes, or of an input; only what changed.
 //!
-//! Files are looked at four times a second. That works on every file system, network ones included, and a graph has a
+//! Files are looked at several times a second. That works on every file system, network ones included, and a graph has a
 //! handful of files; a watcher of the operating system's would be one more dependency for nothing a person notices.
 
-use std::path::{Path, PathBuf};
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::PathBuf;
 use std::time::{Duration, SystemTime};
 
 use pipe::Failure;
 use pipe::project::Project;
-use pipe::run::Session;
+use pipe::run::{Report, Session};
 
 use super::args::{self, RunArgs};
-use super::run::{bind, refuse_overwriting};
+use super::run::{bind, describe, passes, refuse_overwriting};
 use super::{cache_folder, colour, device_choice, output};
+
+/// Time between two looks at the files.
+const LOOK: Duration = Duration::from_millis(200);
+
+/// How a file looks from outside; `None` when it is not there.
+type Stamp = Option<(SystemTime, u64)>;
 
 /// Runs until interrupted.
 pub(super) fn watch(a: &RunArgs) -> Result<(), Failure> {
     let mut session = Session::open(&device_choice(a.device.device.as_deref()), cache_folder().as_deref())?;
-    let mut seen: Option<Vec<(PathBuf, Option<SystemTime>)>> = None;
+    let mut files = BTreeSet::from([PathBuf::from(&a.graph)]);
     loop {
-        let now = stamps(a);
-        if seen.as_ref() != Some(&now) {
-            // A file that is being written is left alone until it rests.
-            if seen.is_some() {
-                std::thread::sleep(Duration::from_millis(50));
+        // As they look before the run: what is saved while it goes on starts the next one.
+        let before: BTreeMap<PathBuf, Stamp> = files.iter().map(|file| (file.clone(), stamp(file))).collect();
+        match once(&mut session, a) {
+            Ok(report) => {
+                output::say(&report.warnings);
+                let what = if output::verbose() { describe(&report) } else { passes(&report) };
+                output::say(&format!("{}: {:.0} ms, {what}", a.graph, report.wall.total));
             }
-            seen = Some(stamps(a));
-            match once(&mut session, a) {
-                Ok(ms) => output::say(&format!("{}: {ms:.0} ms", a.graph)),
-                Err(failure) => output::say(&failure.to_string()),
-            }
+            Err(failure) => output::say(&failure.to_string()),
         }
-        std::thread::sleep(Duration::from_millis(250));
+        files.extend(session.files().iter().cloned());
+        wait(&files.iter().map(|file| before.get(file).copied().unwrap_or_else(|| stamp(file))).collect::<Vec<_>>(), &files);
     }
 }
 
-fn once(session: &mut Session, a: &RunArgs) -> Result<f64, Failure> {
+fn once(session: &mut Session, a: &RunArgs) -> Result<Report, Failure> {
     let mut job = args::job(a)?;
+    job.keep = true;
     let project = Project::open(&a.graph)?;
     let Some(document) = project.document.clone() else { return Err(project.failure(colour())) };
     bind(&mut job, &document, a)?;
     refuse_overwriting(&job)?;
-    Ok(session.run(&job)?.wall.total)
+    session.run(&job)
 }
 
-/// The files that matter, with their times: the graph, everything that lies beside it and is a graph or a shader, and
-/// the inputs.
-fn stamps(a: &RunArgs) -> Vec<(PathBuf, Option<SystemTime>)> {
-    let mut files = vec![PathBuf::from(&a.graph)];
-    let folder = Path::new(&a.graph).parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    if let Ok(entries) = std::fs::read_dir(folder) {
-        let beside = entries.flatten().map(|e| e.path());
-        files.extend(beside.filter(|p| p.extension().is_some_and(|e| e == "ron" || e == "wgsl" || e == "cube")));
+/// Waits until one of the files looks different from before, and then until all rest: a file that is being written is
+/// left alone.
+fn wait(before: &[Stamp], files: &BTreeSet<PathBuf>) {
+    let look = || files.iter().map(stamp).collect::<Vec<Stamp>>();
+    let mut last = look();
+    loop {
+        std::thread::sleep(LOOK);
+        let now = look();
+        if now == last && now != before {
+            return;
+        }
+        last = now;
     }
-    files.extend(a.files.iter().map(PathBuf::from));
-    files.extend(a.input.iter().filter_map(|i| i.split_once('=')).map(|(_, f)| PathBuf::from(f)));
-    // What the run itself writes must not start it again.
-    if a.files.len() > 1 {
-        let out = PathBuf::from(&a.files[a.files.len() - 1]);
-        files.retain(|f| *f != out);
-    }
-    files.sort();
-    files.dedup();
-    let time = |f: &PathBuf| std::fs::metadata(f).and_then(|m| m.modified()).ok();
-    files.into_iter().map(|f| (f.clone(), time(&f))).collect()
+}
+
+fn stamp(file: &PathBuf) -> Stamp {
+    let about = std::fs::metadata(file).ok()?;
+    Some((about.modified().ok()?, about.len()))
 }
