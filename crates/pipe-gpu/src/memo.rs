@@ -13,7 +13,7 @@
 use std::hash::Hash;
 use std::sync::atomic::{AtomicU64, Ordering};
 
-use pipe_plan::plan::{Binding, Launch, Plan, Repeat, Run, SlotId, Step, Times};
+use pipe_plan::plan::{Binding, Kernel, Launch, Plan, Repeat, Run, SlotId, Step, Times};
 use rayon::prelude::*;
 use xxhash_rust::xxh3::{Xxh3, xxh3_128};
 
@@ -71,7 +71,7 @@ impl Act {
 
 /// The acts of a plan's steps.
 pub(crate) fn steps(plan: &Plan) -> Vec<Act> {
-    let kernels: Vec<Key> = plan.kernels.iter().map(of).collect();
+    let kernels: Vec<Key> = plan.kernels.iter().map(of_kernel).collect();
     let act = |step: &Step| {
         let mut reader = Reader { plan, kernels: &kernels, hash: Xxh3::new(), uses: Vec::new() };
         reader.step(step);
@@ -82,6 +82,23 @@ pub(crate) fn steps(plan: &Plan) -> Vec<Act> {
         Act { work: reader.hash.digest128(), uses: reader.uses }
     };
     plan.steps.iter().map(act).collect()
+}
+
+/// The key of a kernel. The order of declarations means nothing in WGSL, and those that put modules together do not
+/// always keep it.
+fn of_kernel(kernel: &Kernel) -> Key {
+    let mut depth = 0_usize;
+    let ends = |c: char| {
+        match c {
+            '{' => depth += 1,
+            '}' => depth = depth.saturating_sub(1),
+            _ => {}
+        }
+        depth == 0 && matches!(c, '}' | ';')
+    };
+    let mut declarations: Vec<&str> = kernel.wgsl.split_inclusive(ends).map(str::trim).collect();
+    declarations.sort_unstable();
+    of((declarations, &kernel.bindings, kernel.launch, kernel.trusted))
 }
 
 /// Reads what a step does. Slots are numbered as they come, so that equal work has equal keys in every plan.
