@@ -148,6 +148,7 @@ fn layout_entry(binding: u32, kind: Binding, launch: Launch) -> wgpu::BindGroupL
 
 fn compile(device: &Device, kernel: &Kernel, node: &str, cache: Option<&wgpu::PipelineCache>) -> Result<Pipeline, GpuError> {
     let gpu = &device.device;
+    let wgsl = kernel.wgsl().map_err(|e| GpuError::Plan { node: node.to_owned(), reason: e.to_string() })?;
     if let Launch::Points(target) = kernel.launch
         && target.precision == Precision::F32
         && !device.has_float_blending()
@@ -156,10 +157,7 @@ fn compile(device: &Device, kernel: &Kernel, node: &str, cache: Option<&wgpu::Pi
     }
     let scopes =
         [wgpu::ErrorFilter::OutOfMemory, wgpu::ErrorFilter::Internal, wgpu::ErrorFilter::Validation].map(|f| gpu.push_error_scope(f));
-    let desc = wgpu::ShaderModuleDescriptor {
-        label: Some(&kernel.label),
-        source: wgpu::ShaderSource::Wgsl(std::borrow::Cow::Borrowed(&kernel.wgsl)),
-    };
+    let desc = wgpu::ShaderModuleDescriptor { label: Some(&kernel.label), source: wgpu::ShaderSource::Wgsl(wgsl) };
     let module = if kernel.trusted {
         // SAFETY: only built-in shaders are trusted. They index their own bindings through the generated port
         // functions, which check what could leave a table or an image, and their loops end.

@@ -10,7 +10,7 @@ use std::time::Instant;
 use pipe_graph::pass::Limits;
 use pipe_graph::types::{ImageType, Precision};
 use pipe_plan::Plan;
-use pipe_plan::plan::{Binding, Fetched, Kernel, KernelId, Launch, Repeat, Run, Slot, SlotId, Step, Storage, Times, Upload};
+use pipe_plan::plan::{Binding, Fetched, Kernel, KernelId, Launch, Repeat, Run, Slot, SlotId, Source, Step, Storage, Times, Upload};
 
 use crate::device::Device;
 use crate::error::GpuError;
@@ -43,7 +43,13 @@ fn single(label: &str, wgsl: &str, slots: Vec<Slot>, bindings: Vec<Binding>, gro
     Plan {
         name: label.to_owned(),
         limits: Limits::default(),
-        kernels: vec![Kernel { label: label.to_owned(), wgsl: Arc::from(wgsl), bindings, launch: Launch::Compute, trusted: true }],
+        kernels: vec![Kernel {
+            label: label.to_owned(),
+            source: Source::Text(Arc::from(wgsl)),
+            bindings,
+            launch: Launch::Compute,
+            trusted: true,
+        }],
         uniforms: Vec::new(),
         literals: Vec::new(),
         uploads,

@@ -139,7 +139,7 @@ pub(crate) fn allocate(name: &str, schedule: Schedule, limits: &Limits, options:
         name: name.to_owned(),
         limits: *limits,
         slots,
-        kernels: composer.finish()?,
+        kernels: composer.finish(),
         uniforms: writer.uniforms,
         literals,
         uploads,

@@ -4,12 +4,16 @@
 //! **Invariants** that holding a `Plan` proves: no slot holds two live resources; every step reads what an
 //! earlier step wrote; a loop leaves its states in the slots that later steps read.
 
+use std::borrow::Cow;
 use std::ops::Range;
 use std::sync::Arc;
 
 use pipe_graph::pass::Limits;
 use pipe_graph::types::{ImageType, VolumeType};
 use serde::Serialize;
+
+use crate::PlanError;
+use crate::compose::put_together;
 
 /// Index of a slot in [`Plan::slots`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize)]
@@ -87,13 +91,35 @@ pub enum Launch {
     Points(ImageType),
 }
 
+/// Where the WGSL text of a kernel comes from.
+#[derive(Debug, Clone, PartialEq, Eq, Hash)]
+pub enum Source {
+    /// Here it is.
+    Text(Arc<str>),
+    /// Modules by name, the main one last, to be put together where the kernel is compiled: most kernels of a frame were
+    /// compiled for the one before.
+    Modules(Arc<[(String, String)]>),
+}
+
+impl Kernel {
+    /// The whole WGSL text: the same bytes for equal kernels.
+    pub fn wgsl(&self) -> Result<Cow<'_, str>, PlanError> {
+        match &self.source {
+            Source::Text(text) => Ok(Cow::Borrowed(text)),
+            Source::Modules(modules) => {
+                put_together(modules).map(Cow::Owned).map_err(|message| PlanError::Shader { label: self.label.clone(), message })
+            }
+        }
+    }
+}
+
 /// A shader module with its interface. Equal kernels occur once in a plan.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
 pub struct Kernel {
     /// For messages: the names of the shader files in it.
     pub label: String,
-    /// The whole WGSL text.
-    pub wgsl: Arc<str>,
+    /// What it is made of.
+    pub source: Source,
     /// What it binds in group 0.
     pub bindings: Vec<Binding>,
     /// Compute or draw.

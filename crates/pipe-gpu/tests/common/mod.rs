@@ -8,7 +8,7 @@ use std::sync::Arc;
 use pipe_gpu::{Choice, Device, Executor, OpenOptions, Outputs, RunOptions};
 use pipe_graph::pass::Limits;
 use pipe_graph::types::{ImageType, Precision};
-use pipe_plan::plan::{Binding, Fetched, Kernel, KernelId, Launch, Plan, Repeat, Run, Slot, SlotId, Step, Storage, Times, Upload};
+use pipe_plan::plan::{Binding, Fetched, Kernel, KernelId, Launch, Plan, Repeat, Run, Slot, SlotId, Source, Step, Storage, Times, Upload};
 
 /// The device that `PIPE_DEVICE` names, or the best one.
 pub(crate) fn device(share_memory: bool) -> Device {
@@ -67,7 +67,7 @@ impl Draft {
 
     pub(crate) fn kernel_as(&mut self, wgsl: &str, bindings: &[Binding], launch: Launch, trusted: bool) -> KernelId {
         let label = format!("kernel {}", self.0.kernels.len());
-        self.0.kernels.push(Kernel { label, wgsl: Arc::from(wgsl), bindings: bindings.to_vec(), launch, trusted });
+        self.0.kernels.push(Kernel { label, source: Source::Text(Arc::from(wgsl)), bindings: bindings.to_vec(), launch, trusted });
         KernelId(self.0.kernels.len() as u32 - 1)
     }
 

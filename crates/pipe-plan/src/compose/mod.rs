@@ -10,24 +10,22 @@
 //!
 //! A `Kernel` shader has its own entry point; its stage is the main module itself. Folds share one, see `walk`.
 //!
-//! Texts are made first and put together at the end, in parallel, once for each distinct kernel.
+//! Texts are put together where a kernel is compiled, once for each distinct one.
 
 mod entry;
 mod layout;
 mod ports;
 mod walk;
 
-use std::collections::BTreeMap;
 use std::fmt::Write as _;
-use std::sync::Arc;
 
-use indexmap::IndexMap;
+use indexmap::IndexSet;
 use pipe_graph::pass::{Access, Entry, Grid, Limits, ResourceId, Shape};
 use pipe_graph::wgsl::LIBRARY;
 
 use crate::PlanError;
 use crate::kernel_pass::{KernelPass, Ops, Source, StagePort};
-use crate::plan::{Binding, Kernel, KernelId, Launch};
+use crate::plan::{self, Binding, Kernel, KernelId, Launch};
 use crate::window::Windows;
 
 pub(crate) use entry::Cover;
@@ -44,19 +42,11 @@ pub(crate) struct Composed {
     pub(crate) cover: Cover,
 }
 
-/// A kernel whose modules are written and not put together yet.
-#[derive(Debug, Clone, PartialEq, Eq, Hash, PartialOrd, Ord)]
-struct Source0 {
-    /// Module name and text; the main module last.
-    modules: Vec<(String, String)>,
-    trusted: bool,
-}
-
 /// Composes kernels and keeps one of each.
 pub(crate) struct Composer<'a> {
     limits: &'a Limits,
     ops: &'a Ops,
-    kernels: IndexMap<Source0, Kernel>,
+    kernels: IndexSet<Kernel>,
 }
 
 /// A bound resource.
@@ -74,7 +64,7 @@ enum Use {
 
 impl<'a> Composer<'a> {
     pub(crate) fn new(limits: &'a Limits, ops: &'a Ops) -> Self {
-        Self { limits, ops, kernels: IndexMap::new() }
+        Self { limits, ops, kernels: IndexSet::new() }
     }
 
     pub(crate) fn limits(&self) -> &'a Limits {
@@ -196,10 +186,8 @@ impl<'a> Composer<'a> {
             _ => Launch::Compute,
         };
         self.within_limits(pass, &bindings)?;
-        let kernel = Kernel { label: labels.join(" + "), wgsl: Arc::from(""), bindings, launch, trusted };
-        let entry = self.kernels.entry(Source0 { modules, trusted });
-        let id = KernelId(entry.index() as u32);
-        entry.or_insert(kernel);
+        let kernel = Kernel { label: labels.join(" + "), source: plan::Source::Modules(modules.into()), bindings, launch, trusted };
+        let id = KernelId(self.kernels.insert_full(kernel).0 as u32);
         Ok(Composed { kernel: id, resources, uniforms, places: block.into_places(), cover })
     }
 
@@ -256,31 +244,9 @@ impl<'a> Composer<'a> {
         Ok(())
     }
 
-    /// Puts every kernel together.
-    pub(crate) fn finish(self) -> Result<Vec<Kernel>, PlanError> {
-        let list: Vec<(Source0, Kernel)> = self.kernels.into_iter().collect();
-        let workers = std::thread::available_parallelism().map_or(1, std::num::NonZero::get).min(list.len().max(1));
-        let mut texts: BTreeMap<usize, Result<String, String>> = BTreeMap::new();
-        std::thread::scope(|scope| {
-            let share = |w: usize| {
-                let list = &list;
-                move || -> Vec<(usize, Result<String, String>)> {
-                    (w..list.len()).step_by(workers).map(|i| (i, put_together(&list[i].0.modules))).collect()
-                }
-            };
-            let threads: Vec<_> = (0..workers).map(|w| scope.spawn(share(w))).collect();
-            for thread in threads {
-                match thread.join() {
-                    Ok(part) => texts.extend(part),
-                    Err(panic) => std::panic::resume_unwind(panic),
-                }
-            }
-        });
-        let finish = |((_, mut kernel), (_, text)): ((Source0, Kernel), (usize, Result<String, String>))| {
-            kernel.wgsl = text.map_err(|message| PlanError::Shader { label: kernel.label.clone(), message })?.into();
-            Ok(kernel)
-        };
-        list.into_iter().zip(texts).map(finish).collect()
+    /// Every distinct kernel.
+    pub(crate) fn finish(self) -> Vec<Kernel> {
+        self.kernels.into_iter().collect()
     }
 }
 
@@ -295,7 +261,7 @@ fn distinct(ids: impl Iterator<Item = ResourceId>) -> Vec<ResourceId> {
 }
 
 /// One WGSL text from the modules; the last is the main one.
-fn put_together(modules: &[(String, String)]) -> Result<String, String> {
+pub(crate) fn put_together(modules: &[(String, String)]) -> Result<String, String> {
     let mut resolver = wesl::VirtualResolver::new();
     let path = |name: &str| -> Result<wesl::ModulePath, String> { format!("package::{name}").parse().map_err(|e| format!("{e:?}")) };
     for (name, text) in LIBRARY {
@@ -306,6 +272,8 @@ fn put_together(modules: &[(String, String)]) -> Result<String, String> {
     }
     let mut compiler = wesl::Wesl::new_barebones().set_custom_resolver(resolver);
     compiler.use_imports(true).use_stripping(true).use_sourcemap(true).set_mangler(wesl::ManglerKind::Escape);
-    let result = compiler.compile(&path("main")?).map_err(|e| e.to_string())?;
-    Ok(result.to_string())
+    let mut syntax = compiler.compile(&path("main")?).map_err(|e| e.to_string())?.syntax;
+    // They come in an order that differs from run to run, which no cache of a driver would know again.
+    syntax.global_declarations.sort_by_cached_key(ToString::to_string);
+    Ok(syntax.to_string())
 }

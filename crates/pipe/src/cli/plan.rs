@@ -39,7 +39,7 @@ pub(super) fn plan(a: &PlanArgs) -> Result<(), Failure> {
     if a.wgsl {
         let mut out = String::new();
         for kernel in &plan.kernels {
-            let _ = writeln!(out, "// {}\n{}", kernel.label, kernel.wgsl);
+            let _ = writeln!(out, "// {}\n{}", kernel.label, kernel.wgsl()?);
         }
         return print(&out);
     }
