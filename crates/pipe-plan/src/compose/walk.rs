@@ -46,7 +46,7 @@ pub(super) fn place(text: &mut String, pass: &KernelPass, stage: &Stage) {
 /// Whether a fold's `take` may ask for more: its `settle` is called outside of the loop over pixels, for the rare ones that
 /// take long.
 fn settles(stage: &Stage) -> bool {
-    stage.shader.source.contains("fn settle(")
+    matches!(stage.entry, Entry::Fold(_)) && stage.shader.source.contains("fn settle(")
 }
 
 /// Hands the pixel `at` to a fold.
