@@ -46,13 +46,13 @@ pub(super) fn place(text: &mut String, pass: &KernelPass, stage: &Stage) {
 /// Whether a fold's `take` may ask for more: its `settle` is called outside of the loop over pixels, for the rare ones that
 /// take long.
 fn settles(stage: &Stage) -> bool {
-    stage.shader.source.contains("fn settle(")
+    matches!(stage.entry, Entry::Fold(_)) && stage.shader.source.contains("fn settle(")
 }
 
 /// Hands the pixel `at` to a fold.
 pub(super) fn take(s: usize, stage: &Stage, v: &str) -> String {
     let call = format!("package::s{s}::take(at, {v})");
-    if settles(stage) { format!("doubt = {call} || doubt;") } else { format!("{call};") }
+    if settles(stage) { format!("let d{s} = {call};") } else { format!("{call};") }
 }
 
 /// The entry point of the folds of a pass, over an image whose size this expression says; of a tile, from the
@@ -63,15 +63,17 @@ pub(super) fn main_module(pass: &KernelPass, walk: Walk, size: &str, tiled: bool
         let folds = pass.stages.iter().enumerate().filter(|(_, s)| matches!(s.entry, Entry::Fold(_)) && of(s));
         folds.map(|(s, _)| format!("    package::s{s}::{function}();\n")).collect()
     };
+    let doubts = pass.stages.iter().enumerate().filter(|(_, stage)| settles(stage)).map(|(s, _)| format!("d{s}"));
+    let doubt = doubts.collect::<Vec<_>>().join(" | ");
     let (begin, end, settle) = (each("begin", &|_| true), each("end", &|_| true), each("settle", &settles));
     let ([lx, ly], [tx, ty]) = (walk.lanes, walk.tile);
     let offset = if tiled { "package::io::uniforms.grid_first + " } else { "" };
     let body = stage_calls(pass, index);
     let next = format!("at.x += {lx};\nif at.x >= last.x {{ at = vec2i(start.x, at.y + {ly}); }}\n");
-    let pixels = if settle.is_empty() {
+    let pixels = if doubt.is_empty() {
         format!("    while at.y < last.y {{\n{body}{next}    }}\n")
     } else {
-        let quick = format!("    while at.y < last.y {{\nvar doubt = false;\n{body}{next}if doubt {{ break; }}\n    }}\n");
+        let quick = format!("    while at.y < last.y {{\n{body}{next}if {doubt} {{ break; }}\n    }}\n");
         format!("    while at.y < last.y {{\n{quick}{settle}    }}\n")
     };
     format!(
