@@ -177,12 +177,24 @@ struct Held {
     why: String,
 }
 
+/// One way through all tiles.
+#[derive(Debug, Clone)]
+struct Round {
+    level: u32,
+    /// The operations that leave something whole, or that the host takes from, by position.
+    ends: Vec<usize>,
+    /// Everything that runs, by position, in order.
+    body: Vec<usize>,
+}
+
 /// What is streamed, and in which round each operation runs.
 struct Streams {
     list: Vec<Op>,
     streamed: BTreeSet<ResourceId>,
     /// By position in `list`.
     levels: Vec<u32>,
+    makers: BTreeMap<ResourceId, usize>,
+    rounds: Vec<Round>,
     /// What is held whole although it is an image, with the reason.
     held: Vec<Held>,
 }
@@ -196,7 +208,9 @@ impl Streams {
         loop {
             let (streamed, held) = streamed(&list, ops, &excluded);
             let levels = levels(&list, &streamed);
-            let this = Self { list: list.clone(), streamed, levels, held };
+            let makers = list.iter().enumerate().flat_map(|(i, op)| op.results().into_iter().map(move |id| (id, i))).collect();
+            let mut this = Self { list: list.clone(), streamed, levels, makers, rounds: Vec::new(), held };
+            this.rounds = this.find_rounds(ops);
             match this.torn(ops) {
                 None => return this,
                 Some(held) => excluded.push(held),
@@ -265,47 +279,42 @@ impl Streams {
         let mut open: Vec<usize> = ends.to_vec();
         while let Some(at) = open.pop() {
             for id in self.list[at].sources().into_iter().filter(|id| self.streamed.contains(id)) {
-                if let Some(maker) = self.maker(id).filter(|m| !taken.contains(m)) {
-                    taken.insert(maker);
-                    open.push(maker);
+                if let Some(maker) = self.makers.get(&id).filter(|maker| taken.insert(**maker)) {
+                    open.push(*maker);
                 }
             }
         }
         taken.into_iter().collect()
     }
 
-    fn maker(&self, id: ResourceId) -> Option<usize> {
-        self.list.iter().position(|op| op.results().contains(&id))
-    }
-
     /// Something streamed that would have to be made again in a later round by a pass that also leaves something whole,
     /// which must be made once only.
     fn torn(&self, ops: &Ops) -> Option<Held> {
-        self.rounds(ops).into_iter().find_map(|(level, ends, body)| {
-            let twice = body.iter().find(|at| !ends.contains(at) && self.is_end(&self.list[**at], ops) && self.levels[**at] < level)?;
+        self.rounds.iter().find_map(|round| {
+            let again = |at: usize| !round.ends.contains(&at) && self.levels[at] < round.level && self.is_end(&self.list[at], ops);
+            let twice = round.body.iter().find(|at| again(**at))?;
             let Op::Pass(pass) = &self.list[*twice] else { return None };
             if pass.stages.iter().all(|s| s.entry == Entry::Point) {
                 return None;
             }
             let id = pass.writes.iter().map(|w| w.resource).find(|id| self.streamed.contains(id))?;
-            Some(Held { id, why: format!("{} makes it together with what must be known before", pass.name) })
+            Some(Held { id, why: format!("`{}` makes it together with what must be known before", node(pass, ops)) })
         })
     }
 
-    /// The rounds: level, the operations that end in it, everything that it runs.
-    fn rounds(&self, ops: &Ops) -> Vec<(u32, Vec<usize>, Vec<usize>)> {
+    /// For each level and size of images the operations that end there, with all that they need.
+    fn find_rounds(&self, ops: &Ops) -> Vec<Round> {
         let mut groups: BTreeMap<(u32, [u32; 2]), Vec<usize>> = BTreeMap::new();
         for (i, op) in self.list.iter().enumerate() {
             if self.is_end(op, ops) {
                 groups.entry((self.levels[i], size_of(op, ops))).or_default().push(i);
             }
         }
-        groups.into_iter().map(|((level, _), ends)| (level, ends.clone(), self.closure(&ends))).collect()
+        groups.into_iter().map(|((level, _), ends)| Round { level, body: self.closure(&ends), ends }).collect()
     }
 
     /// The schedule over tiles of this size.
     fn cut(&self, mut ops: Ops, step: [u32; 2]) -> Schedule {
-        let rounds = self.rounds(&ops);
         let mut portions = Vec::new();
         let last = self.levels.iter().copied().max().unwrap_or(0);
         for level in 0..=last {
@@ -314,8 +323,8 @@ impl Streams {
             if !whole.is_empty() {
                 portions.push(Portion::Whole(whole));
             }
-            for (_, ends, body) in rounds.iter().filter(|r| r.0 == level) {
-                portions.push(Portion::Tiles(self.round(&mut ops, ends, body, step)));
+            for round in self.rounds.iter().filter(|r| r.level == level) {
+                portions.push(Portion::Tiles(self.tiling(&mut ops, round, step)));
             }
         }
         // What the host takes tile by tile is no fetch of the end.
@@ -326,8 +335,8 @@ impl Streams {
         Schedule { ops, portions }
     }
 
-    /// One round.
-    fn round(&self, ops: &mut Ops, ends: &[usize], body: &[usize], step: [u32; 2]) -> TilingOp {
+    /// A round over tiles of this size.
+    fn tiling(&self, ops: &mut Ops, Round { ends, body, .. }: &Round, step: [u32; 2]) -> TilingOp {
         let mut list: Vec<Op> = body.iter().map(|i| self.list[*i].clone()).collect();
         let size = size_of(&self.list[ends[0]], ops);
         let step = [step[0].min(size[0]), step[1].min(size[1])];
@@ -523,26 +532,31 @@ fn streamed(list: &[Op], ops: &Ops, excluded: &[Held]) -> (BTreeSet<ResourceId>,
     (streamed, held)
 }
 
+/// The node that a pass ends in.
+fn node<'o>(pass: &KernelPass, ops: &'o Ops) -> &'o str {
+    pass.nodes.last().map_or("", |label| &ops.nodes[label.0 as usize])
+}
+
 type Keep<'k> = dyn FnMut(&mut BTreeSet<ResourceId>, ResourceId, String) + 'k;
 
 /// What a pass needs whole.
 fn hold_for(pass: &KernelPass, ops: &Ops, streamed: &mut BTreeSet<ResourceId>, keep: &mut Keep<'_>) {
     let Some(size) = tileable(pass, ops) else {
         for id in pass.sources().chain(pass.writes.iter().map(|w| w.resource)).collect::<Vec<_>>() {
-            keep(streamed, id, format!("{} works on whole images", pass.name));
+            keep(streamed, id, format!("`{}` works on whole images", node(pass, ops)));
         }
         return;
     };
     for (read, id) in pass.reads.iter().enumerate() {
         let other = ops.shape(*id).plane().is_some_and(|own| own != size);
         if other || look(pass, read) == Look::Whole {
-            keep(streamed, *id, format!("{} reads it from anywhere", pass.name));
+            keep(streamed, *id, format!("`{}` reads it from anywhere", node(pass, ops)));
         }
     }
     for write in &pass.writes {
         if let Some(old) = write.in_place_of {
             for id in [old, write.resource] {
-                keep(streamed, id, format!("{} updates it in place", pass.name));
+                keep(streamed, id, format!("`{}` updates it in place", node(pass, ops)));
             }
         }
     }
@@ -561,7 +575,7 @@ fn hold_for_loop(l: &LoopOp, ops: &Ops, streamed: &mut BTreeSet<ResourceId>, kee
     }
     let outside: Vec<ResourceId> = l.body.iter().flat_map(Op::sources).collect();
     for id in states.into_iter().chain(own).chain(outside) {
-        keep(streamed, id, format!("the iterations of {} need it whole", l.name));
+        keep(streamed, id, format!("the iterations of `{}` need it whole", ops.nodes[l.node.0 as usize]));
     }
 }
 
