@@ -3,7 +3,7 @@
 CARGO ?= cargo
 IMAGE := tests/data/workshop.exr
 
-.PHONY: demo test build setup fmt clippy generated gallery goldens
+.PHONY: demo test test-large build setup fmt clippy generated gallery goldens
 
 # Vulkan's layers complain where there is no session.
 export XDG_RUNTIME_DIR ?= /tmp
@@ -19,6 +19,11 @@ demo: setup
 # Every test, on whatever adapter there is; none is skipped for want of one.
 test: setup
 	@bash tests/run.sh
+
+# An image of 32768² pixels against NumPy: a quarter of an hour, 24 GiB of disk, Python with NumPy. SIZE=8192 is quicker.
+test-large: setup build
+	@python3 -c 'import numpy' || { echo "test-large compares with NumPy: sudo apt-get install python3-numpy"; exit 1; }
+	python3 tests/references/large.py --size $(or $(SIZE),32768) --vram $(or $(VRAM),512MiB)
 
 build:
 	$(CARGO) build --release --locked --package pipe

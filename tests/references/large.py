@@ -6,7 +6,7 @@
 Writes the image (half floats, uncompressed EXR, SIZE x SIZE x 6 bytes: 6 GiB for 32768), runs `pipe` on it and compares
 what comes out with double precision: every pixel of the tone-mapped and the equalized image, every 8th band of the blurred
 one (and so pixels at the seams of tiles of any size). `pipe` may take 2 GiB of memory at most. Needs NumPy and, for the
-default size, 24 GiB of disk and half an hour on two cores.
+default size, 24 GiB of disk and a quarter of an hour on two cores.
 """
 
 import argparse

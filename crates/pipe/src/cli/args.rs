@@ -130,7 +130,7 @@ pub(crate) struct DeviceArgs {
     /// A number of `pipe devices`, part of a name, or `cpu`; also PIPE_DEVICE.
     #[arg(long, value_name = "N|NAME|cpu")]
     pub(crate) device: Option<String>,
-    /// Memory that a plan may take, such as 512MiB or 4GiB.
+    /// Memory that a plan may take, such as 512MiB or 4GiB; what does not fit is made in tiles.
     #[arg(long, value_name = "SIZE")]
     pub(crate) vram: Option<String>,
     /// Run every pass on its own.
@@ -178,7 +178,7 @@ pub(crate) struct PlanArgs {
     /// Plan for a CPU device.
     #[arg(long)]
     pub(crate) cpu: bool,
-    /// Memory that the plan may take.
+    /// Memory that the plan may take; what does not fit is made in tiles.
     #[arg(long, value_name = "SIZE")]
     pub(crate) vram: Option<String>,
     /// Leave every pass on its own.
