@@ -7,7 +7,7 @@ use pipe_graph::types::{ImageType, Precision, VolumeType};
 use serde_json::{Value, json};
 
 use crate::kernel_pass::{Op, Ops};
-use crate::plan::{Plan, Repeat, Run, Step, Storage, Tiling, Times};
+use crate::plan::{Plan, Rect, Repeat, Run, Step, Storage, Tiling, Times};
 
 /// One launch with what runs it again and again.
 struct Line<'p> {
@@ -214,8 +214,11 @@ impl Plan {
         const STEP: usize = 36;
         const ROW: usize = 22;
         const LEFT: usize = 220;
+        const LAYOUT: usize = 160;
         let lines = self.lines();
-        let (width, height) = (LEFT + STEP * lines.len().max(1) + 20, ROW * self.slots.len() + 170);
+        let layouts = 150 + ROW * self.slots.len() + 20;
+        let height = layouts + (LAYOUT + 40) * self.tilings().count();
+        let width = LEFT + STEP * lines.len().max(1) + 20;
         let mut out = format!(
             "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{width}\" height=\"{height}\" font-family=\"sans-serif\" font-size=\"11\">\n\
              <rect width=\"100%\" height=\"100%\" fill=\"white\"/>\n<text x=\"10\" y=\"16\">{}: peak {}, without sharing {}</text>\n",
@@ -258,8 +261,49 @@ impl Plan {
                 }
             }
         }
+        for (i, tiling) in self.tilings().enumerate() {
+            let top = layouts + i * (LAYOUT + 40);
+            let [columns, rows] = tiling.layout();
+            let _ = writeln!(
+                out,
+                "<text x=\"10\" y=\"{}\">{}: {}x{} in {columns}x{rows} tiles of {}x{}</text>",
+                top + 12,
+                escape(&tiling.name),
+                tiling.size[0],
+                tiling.size[1],
+                tiling.step[0],
+                tiling.step[1]
+            );
+            layout(&mut out, tiling, [10, top + 20], LAYOUT as f64);
+        }
         out.push_str("</svg>\n");
         out
+    }
+}
+
+/// The tiles of an image, and around the middle one what is uploaded for it, in a square of this side.
+fn layout(out: &mut String, tiling: &Tiling, at: [usize; 2], side: f64) {
+    let scale = side / f64::from(tiling.size[0].max(tiling.size[1]));
+    let place = |n: u32, axis: usize| at[axis] as f64 + f64::from(n) * scale;
+    let rectangle = |r: &Rect, style: &str| {
+        let [w, h] = r.size().map(|n| f64::from(n) * scale);
+        let (x, y) = (place(r.x.start, 0), place(r.y.start, 1));
+        format!("<rect x=\"{x:.2}\" y=\"{y:.2}\" width=\"{w:.2}\" height=\"{h:.2}\" {style}/>\n")
+    };
+    let whole = Rect { x: 0..tiling.size[0], y: 0..tiling.size[1] };
+    out.push_str(&rectangle(&whole, "fill=\"#deebf7\" stroke=\"black\" stroke-width=\"0.5\""));
+    let cuts = |axis: usize| (0..tiling.size[axis]).step_by(tiling.step[axis] as usize).skip(1);
+    let (right, bottom) = (place(tiling.size[0], 0), place(tiling.size[1], 1));
+    let mut line = |[x1, y1, x2, y2]: [f64; 4]| {
+        let _ =
+            writeln!(out, "<line x1=\"{x1:.2}\" y1=\"{y1:.2}\" x2=\"{x2:.2}\" y2=\"{y2:.2}\" stroke=\"#3182bd\" stroke-width=\"0.5\"/>");
+    };
+    cuts(0).for_each(|x| line([place(x, 0), place(0, 1), place(x, 0), bottom]));
+    cuts(1).for_each(|y| line([place(0, 0), place(y, 1), right, place(y, 1)]));
+    let [columns, rows] = tiling.layout();
+    let middle = tiling.tiles.get((rows / 2 * columns + columns / 2) as usize);
+    for upload in middle.iter().flat_map(|tile| &tile.uploads) {
+        out.push_str(&rectangle(&upload.rect, "fill=\"#3182bd\" fill-opacity=\"0.4\""));
     }
 }
 
