@@ -152,5 +152,5 @@ fn images_wider_than_a_texture_are_cut_along_x() {
     let make = || plan(&graph, &Limits::default(), &Options::default()).unwrap_or_else(|e| panic!("{e}"));
     let text = make().to_text();
     assert_eq!(text, make().to_text());
-    assert_eq!(make().tilings().map(|t| t.layout()).collect::<Vec<_>>(), [[5, 1]], "{text}");
+    assert_eq!(make().tilings().map(pipe_plan::plan::Tiling::layout).collect::<Vec<_>>(), [[5, 1]], "{text}");
 }

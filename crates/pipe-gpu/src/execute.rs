@@ -12,7 +12,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 use indexmap::IndexMap;
-use pipe_plan::plan::{Crossing, Plan, SlotId, Step, Upload};
+use pipe_plan::plan::{Crossing, Plan, SlotId, Step, Tile, Upload};
 
 use crate::device::Device;
 use crate::error::GpuError;
@@ -29,7 +29,7 @@ use crate::transfer::{Transfer, copy_out};
 /// How to run.
 #[derive(Clone, Copy, Default)]
 pub struct RunOptions<'a> {
-    /// Bounds the whole run: transfers and GPU work.
+    /// Bounds the whole run, transfers and GPU work; of what is made in tiles each tile.
     pub timeout: Option<Duration>,
     /// Measure the GPU time of every pass. Passes then run one by one.
     pub profile: bool,
@@ -218,7 +218,7 @@ impl Executor {
         take: &mut dyn FnMut(Part<'_>),
     ) -> Result<Timings, GpuError> {
         let plan = &prepared.plan;
-        let patience = Patience::new(options.timeout, options.cancel);
+        let mut patience = Patience::new(options.timeout, options.cancel);
         let mut timings = Timings::default();
 
         let started = Instant::now();
@@ -255,11 +255,14 @@ impl Executor {
         timings.upload_ms = millis(started);
 
         self.histories.recall(&self.device, plan, &prepared.memory);
-        let run = Running { prepared, options, patience: &patience };
         let chosen: Vec<&Ready> = prepared.steps.iter().zip(steps).filter(|(_, chosen)| **chosen).map(|(step, _)| step).collect();
         for steps in chosen.chunk_by(|a, b| !matches!(a, Ready::Tiles(_)) && !matches!(b, Ready::Tiles(_))) {
+            let run = Running { prepared, options, patience: &patience };
             match steps {
-                [Ready::Tiles(tiles)] => self.tiles(&run, tiles, exchange, &mut timings)?,
+                [Ready::Tiles(tiles)] => {
+                    self.tiles(&run, tiles, exchange, &mut timings)?;
+                    patience = Patience::new(options.timeout, options.cancel);
+                }
                 _ => self.launch(&run, steps.iter().copied(), None, &mut timings)?,
             }
         }
@@ -308,44 +311,57 @@ impl Executor {
         Ok(())
     }
 
-    /// Runs the body for every tile.
+    /// Runs the body for every tile. The time that a run may take is that of a tile here: reading and writing files between
+    /// them takes as long as it takes.
     fn tiles(&mut self, run: &Running<'_>, tiles: &ReadyTiles, exchange: &mut dyn Exchange, timings: &mut Timings) -> Result<(), GpuError> {
-        let Running { prepared, options, patience } = *run;
-        let plan = &prepared.plan;
-        let tiling = tiles::tiling(plan, tiles.step)?;
+        let Running { prepared, options, .. } = *run;
+        let tiling = tiles::tiling(&prepared.plan, tiles.step)?;
         let mut encoder = self.device.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
         tiles.clears.iter().for_each(|memory| memory.zero(&mut encoder));
         self.device.queue.submit([encoder.finish()]);
         for (done, tile) in tiling.tiles.iter().enumerate() {
-            let started = Instant::now();
-            for from in &tile.uploads {
-                let held = exchange.rows(from).map_err(GpuError::Exchange)?;
-                let buffer = memory(prepared, from.slot)?.buffer(&plan.name)?;
-                self.transfer.upload(&self.device, buffer, held.bytes, &from.ranges(&held.rows), patience, &from.name)?;
-            }
-            if let Some(buffer) = &prepared.uniforms {
-                tiles::place(&self.device, plan, buffer, tile);
-            }
-            timings.upload_ms += millis(started);
-
-            self.launch(run, tiles.body.iter(), Some((tiles.first_id, &tile.groups)), timings)?;
-
-            let started = Instant::now();
-            let mut taken: Vec<Vec<u8>> = tile.fetches.iter().map(|to| vec![0; to.bytes() as usize]).collect();
-            let one = |to: &Crossing| Ok((memory(prepared, to.slot)?.buffer(&plan.name)?, to.bytes()));
-            let buffers = tile.fetches.iter().map(one).collect::<Result<Vec<_>, GpuError>>()?;
-            self.transfer.download(&self.device, &buffers, patience, &plan.name, &mut |i, at, bytes| {
-                copy_out(&mut taken[i][at as usize..at as usize + bytes.len()], bytes);
-            })?;
-            timings.readback_ms += millis(started);
-            for (to, bytes) in tile.fetches.iter().zip(&taken) {
-                exchange.put(to, bytes).map_err(GpuError::Exchange)?;
-            }
+            let patience = Patience::new(options.timeout, options.cancel);
+            self.tile(&Running { patience: &patience, ..*run }, tiles, tile, exchange, timings)?;
             if let Some(progress) = options.progress {
                 progress(done as u32 + 1, tiling.tiles.len() as u32);
             }
         }
         Ok(())
+    }
+
+    /// Brings what a tile needs, runs the body, takes what it made.
+    fn tile(
+        &mut self,
+        run: &Running<'_>,
+        tiles: &ReadyTiles,
+        tile: &Tile,
+        exchange: &mut dyn Exchange,
+        timings: &mut Timings,
+    ) -> Result<(), GpuError> {
+        let Running { prepared, patience, .. } = *run;
+        let plan = &prepared.plan;
+        let started = Instant::now();
+        for from in &tile.uploads {
+            let held = exchange.rows(from).map_err(GpuError::Exchange)?;
+            let buffer = memory(prepared, from.slot)?.buffer(&plan.name)?;
+            self.transfer.upload(&self.device, buffer, held.bytes, &from.ranges(&held.rows), patience, &from.name)?;
+        }
+        if let Some(buffer) = &prepared.uniforms {
+            tiles::place(&self.device, plan, buffer, tile);
+        }
+        timings.upload_ms += millis(started);
+
+        self.launch(run, tiles.body.iter(), Some((tiles.first_id, &tile.groups)), timings)?;
+
+        let started = Instant::now();
+        let mut taken: Vec<Vec<u8>> = tile.fetches.iter().map(|to| vec![0; to.bytes() as usize]).collect();
+        let one = |to: &Crossing| Ok((memory(prepared, to.slot)?.buffer(&plan.name)?, to.bytes()));
+        let buffers = tile.fetches.iter().map(one).collect::<Result<Vec<_>, GpuError>>()?;
+        self.transfer.download(&self.device, &buffers, patience, &plan.name, &mut |i, at, bytes| {
+            copy_out(&mut taken[i][at as usize..at as usize + bytes.len()], bytes);
+        })?;
+        timings.readback_ms += millis(started);
+        tile.fetches.iter().zip(&taken).try_for_each(|(to, bytes)| exchange.put(to, bytes).map_err(GpuError::Exchange))
     }
 }
 

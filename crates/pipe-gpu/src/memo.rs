@@ -13,7 +13,7 @@
 use std::hash::Hash;
 use std::sync::atomic::{AtomicU64, Ordering};
 
-use pipe_plan::plan::{Binding, Launch, Plan, Repeat, Run, SlotId, Step, Tiling, Times};
+use pipe_plan::plan::{Binding, Crossing, Launch, Plan, Repeat, Run, SlotId, Step, Tiling, Times};
 use rayon::prelude::*;
 use xxhash_rust::xxh3::{Xxh3, xxh3_128};
 
@@ -110,9 +110,9 @@ impl Reader<'_> {
     fn tiles(&mut self, tiling: &Tiling) {
         tiling.body.iter().for_each(|step| self.step(step));
         tiling.clears.iter().for_each(|slot| self.slot(*slot, true));
-        for tile in tiling.tiles.first().iter() {
-            tile.uploads.iter().for_each(|upload| self.slot(upload.slot, true));
-        }
+        // The same slots for every tile.
+        let uploads = tiling.tiles.first().map_or(&[] as &[Crossing], |tile| &tile.uploads);
+        uploads.iter().for_each(|upload| self.slot(upload.slot, true));
     }
 
     fn run(&mut self, run: &Run) {
@@ -270,10 +270,10 @@ mod tests {
         let mut defined = vec![0, 1];
         for step in 0..2 + dice.below(10) {
             let mut uses = Vec::new();
-            for _ in 0..1 + dice.below(2) {
+            for _ in 0..=dice.below(2) {
                 uses.push(Use { slot: defined[dice.below(defined.len())], writes: false, clears: false });
             }
-            for _ in 0..1 + dice.below(2) {
+            for _ in 0..=dice.below(2) {
                 uses.push(Use { slot: dice.below(slots), writes: true, clears: dice.below(4) == 0 });
             }
             uses.sort_by_key(|u| u.slot);
@@ -310,7 +310,7 @@ mod tests {
         for _ in 0..2000 {
             let slots = 3 + dice.below(8);
             let mut acts = random_acts(&mut dice, slots);
-            let wanted: Vec<SlotId> = (0..1 + dice.below(2)).map(|_| SlotId(dice.below(slots) as u32)).collect();
+            let wanted: Vec<SlotId> = (0..=dice.below(2)).map(|_| SlotId(dice.below(slots) as u32)).collect();
             let mut contents = vec![None; slots];
             let mut memory: Vec<u128> = (0..slots as u128).collect();
             for _ in 0..6 {

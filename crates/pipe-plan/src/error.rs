@@ -31,7 +31,10 @@ pub enum PlanError {
     )]
     Budget { needed: u64, budget: u64, name: String, bytes: u64 },
     /// It does not fit, and tiles do not help.
-    #[error("{whole}\n  tiles do not help: {why}")]
+    #[error(
+        "{}\n  tiles do not help: {why}\n  next: give it more with --vram, shrink the image, or use options: (format: F16)",
+        whole.reason()
+    )]
     NoTiles { whole: Box<Self>, why: String },
     /// A node refused to be lowered.
     #[error("`{name}` {message}")]
@@ -39,6 +42,12 @@ pub enum PlanError {
 }
 
 impl PlanError {
+    /// What is wrong, without what to do next.
+    pub(crate) fn reason(&self) -> String {
+        let text = self.to_string();
+        text.split_once("\n  next: ").map_or(text.clone(), |(reason, _)| reason.to_owned())
+    }
+
     /// Whether images made in parts may help.
     pub(crate) const fn is_about_size(&self) -> bool {
         matches!(self, Self::ImageTooLarge { .. } | Self::TableTooLarge { .. } | Self::TooManyGroups { .. } | Self::Budget { .. })

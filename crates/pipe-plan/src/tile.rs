@@ -61,12 +61,13 @@ pub(crate) fn plan(name: &str, schedule: &Schedule, limits: &Limits, options: &O
         match crate::allocate::allocate(name, streams.cut(schedule.ops.clone(), candidate.step), limits, options) {
             Ok(plan) => return Ok(plan),
             Err(error) if error.is_about_size() => {
-                reason = Some(format!("with tiles of {}x{}, {error}", candidate.step[0], candidate.step[1]))
+                let [w, h] = candidate.step;
+                reason = Some(format!("with tiles of {w}x{h}, {}", error.reason()));
             }
             Err(error) => return Err(error.to_string()),
         }
     }
-    Err(streams.culprit(&schedule.ops).or(reason).unwrap_or_else(|| "even the smallest do not fit".to_owned()))
+    Err(streams.culprit(&schedule.ops).or(reason).unwrap_or_else(|| streams.widest(&schedule.ops)))
 }
 
 /// The plan over tiles of this size; over whole images where nothing can be made in tiles.
@@ -223,6 +224,17 @@ impl Streams {
         let largest = self.held.iter().max_by_key(|h| ops.shape(h.id).bytes())?;
         let resource = &ops.resources[largest.id.index()];
         Some(format!("`{}` needs {} whole, since {}", resource.name, human(&resource.shape.bytes()), largest.why))
+    }
+
+    /// What the smallest tiles need most of.
+    fn widest(&self, ops: &Ops) -> String {
+        let schedule = self.cut(ops.clone(), [LEAST; 2]);
+        let tilings = schedule.portions.iter().filter_map(|p| if let Portion::Tiles(t) = p { Some(t) } else { None });
+        let held = tilings.flat_map(|t| t.windows.halos.keys()).map(|id| &schedule.ops.resources[id.index()]);
+        let widest = held.max_by_key(|r| r.shape.bytes());
+        widest.map_or_else(String::new, |r| {
+            format!("even for tiles of {LEAST}x{LEAST} `{}` takes {}, since passes look so far around", r.name, human(&r.shape.bytes()))
+        })
     }
 
     /// Sizes of tiles that may fit, halved again and again from the whole image; how much they overlap.
@@ -428,7 +440,7 @@ impl Streams {
     /// leaves only tables runs a block in the tile that it begins in.
     fn to_blocks(&self, pass: &KernelPass, ops: &Ops, block: [u32; 2], step: [u32; 2]) -> Halo {
         let makes_pixels = pass.writes.iter().any(|w| ops.shape(w.resource).plane().is_some());
-        let beyond = |i: usize| if step[i] % block[i] == 0 && !makes_pixels { 0 } else { block[i] - 1 };
+        let beyond = |i: usize| if step[i].is_multiple_of(block[i]) && !makes_pixels { 0 } else { block[i] - 1 };
         let after = [beyond(0), beyond(1)];
         Halo { before: if makes_pixels { after } else { [0, 0] }, after }
     }

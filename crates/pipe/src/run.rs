@@ -412,7 +412,7 @@ impl Session {
         let held: HashMap<&str, Cow<'_, [u8]>> = inputs.iter().map(|(n, d)| (n.as_str(), d.bytes())).collect();
         let given: HashMap<&str, &[u8]> = held.iter().map(|(n, b)| (*n, b.as_ref())).collect();
         let mut pictures = Pictures::of(&inputs, plan)?;
-        for fetch in plan.tilings().flat_map(|t| t.tiles.first()).flat_map(|t| &t.fetches) {
+        for fetch in plan.tilings().filter_map(|t| t.tiles.first()).flat_map(|t| &t.fetches) {
             let image = outputs.iter().find(|o| o.name == fetch.name).and_then(|o| match &o.to {
                 Packed::Image { target, form, size } if !target.format.moves() => Some((target, form, size, &o.metadata)),
                 _ => None,

@@ -65,7 +65,7 @@ pub(super) fn run(a: &RunArgs) -> Result<(), Failure> {
             });
             let (mut session, inputs) = (session?, inputs?);
             let decoded = started.elapsed().as_secs_f64() * 1e3;
-            let bar = output::progress(1, "iterations");
+            let bar = output::progress(1, "steps");
             let tell = |done: u32, of: u32| {
                 bar.set_length(of.into());
                 bar.set_position(done.into());
