@@ -112,6 +112,14 @@ fn summed_area_tables_in_tiles() {
     same_in_tiles(r#""s": Sat(image: "in"), "b": BoxFromSat(sat: "s", radius: 5)"#, r#""out": "b", "sat": "s""#);
 }
 
+#[test]
+fn scopes_in_tiles() {
+    same_in_tiles(
+        r#""w": Waveform(image: "in"), "v": Vectorscope(image: "in"), "h": Histogram2d(image: "in")"#,
+        r#""w": "w", "v": "v", "h": "h.counts""#,
+    );
+}
+
 /// What somebody reads from anywhere is made in tiles and held whole.
 #[test]
 fn an_image_that_is_read_from_anywhere_is_held() {

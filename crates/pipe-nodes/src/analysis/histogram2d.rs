@@ -54,14 +54,13 @@ impl Node for Histogram2d {
 
     fn lower(&self, cx: &mut Lowering<'_>) -> Result<(), Mistake> {
         let (image, out, counts) = (cx.input(&self.image), cx.output("out"), cx.output("counts"));
-        let [w, h] = cx.image_of(image).size;
         let pass = cx
             .pass("counts", shader!("analysis/histogram2d"))
             .entry(Entry::Each)
-            .read("image", image, Reach::Whole)
+            .read("image", image, Reach::Point)
             .write_as("counts", counts, Access::Atomic, None)
             .constant("CHANNEL_Y", self.y as i32)
-            .grid(Grid::Elements([w, h, 1]));
+            .grid(Grid::Blocks([1, 1]));
         self.binning(self.x).describe(pass).add();
         self.scope().show(cx, counts, out);
         Ok(())

@@ -41,15 +41,14 @@ impl Node for Vectorscope {
 
     fn lower(&self, cx: &mut Lowering<'_>) -> Result<(), Mistake> {
         let (image, out) = (cx.input(&self.image), cx.output("out"));
-        let [w, h] = cx.image_of(image).size;
         let counts = cx.intermediate("counts", Shape::uints(self.scope().cells()));
         cx.pass("counts", shader!("analysis/vectorscope"))
             .entry(Entry::Each)
-            .read("image", image, Reach::Whole)
+            .read("image", image, Reach::Point)
             .write_as("counts", counts, Access::Atomic, None)
             .constant("SIZE", self.size as i32)
             .param("extent", self.extent())
-            .grid(Grid::Elements([w, h, 1]))
+            .grid(Grid::Blocks([1, 1]))
             .add();
         self.scope().show(cx, counts, out);
         Ok(())

@@ -66,17 +66,16 @@ impl Node for Waveform {
 
     fn lower(&self, cx: &mut Lowering<'_>) -> Result<(), Mistake> {
         let (image, out) = (cx.input(&self.image), cx.output("out"));
-        let [w, h] = cx.image_of(image).size;
-        let scope = self.scope(w);
+        let scope = self.scope(cx.image_of(image).size[0]);
         let counts = cx.intermediate("counts", Shape::uints(scope.cells()));
         let pass = cx
             .pass("counts", shader!("analysis/waveform"))
             .entry(Entry::Each)
-            .read("image", image, Reach::Whole)
+            .read("image", image, Reach::Point)
             .write_as("counts", counts, Access::Atomic, None)
             .constant("COLUMNS", scope.width)
             .constant("PANELS", scope.panels() as i32)
-            .grid(Grid::Elements([w, h, 1]));
+            .grid(Grid::Blocks([1, 1]));
         self.binning(Channel::Luminance).describe(pass).add();
         scope.show(cx, counts, out);
         Ok(())
