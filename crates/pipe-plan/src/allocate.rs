@@ -14,10 +14,10 @@
 //! Colouring takes values in the order in which they begin and gives each the free slot of equal storage that was
 //! freed last; for intervals that uses exactly as many slots as are alive at once.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
 
-use pipe_graph::pass::{Access, Count, Entry, Grid, Limits, Origin, Reach, ResourceId, Shader, Shape, Value};
+use pipe_graph::pass::{Access, Count, Entry, Grid, Limits, Origin, Reach, ResourceId, Shader, Shape, State, Value};
 use pipe_graph::types::Precision;
 
 use crate::compose::{Composed, Composer, Cover, Place, Placed};
@@ -84,7 +84,16 @@ pub(crate) fn allocate(name: &str, schedule: Schedule, limits: &Limits, options:
     let Schedule { ops, portions } = schedule;
     let readers = readers(&ops, &portions);
     let composer = Composer::new(limits, &ops);
-    let mut player = Player { ops: &ops, composer, readers, held: Vec::new(), time: 1, windows: None };
+    let mut player = Player {
+        ops: &ops,
+        composer,
+        readers,
+        overwritten: overwritten(&portions),
+        lasting: Vec::new(),
+        held: Vec::new(),
+        time: 1,
+        windows: None,
+    };
     let mut names = Names::new();
     let given = given(&ops, &portions);
     for id in &given {
@@ -186,6 +195,20 @@ fn readers(ops: &Ops, portions: &[Portion]) -> BTreeMap<ResourceId, usize> {
     count
 }
 
+/// What some pass takes over the storage of, as the initial value of a state too.
+fn overwritten(portions: &[Portion]) -> BTreeSet<ResourceId> {
+    fn walk(op: &Op) -> Vec<ResourceId> {
+        match op {
+            Op::Pass(_) => op.takes_over(),
+            Op::Loop(l) => {
+                let states = l.states.iter().filter(|s| updated_in_place(&l.body, s.next, s.carried)).map(|s| s.init);
+                states.chain(l.body.iter().flat_map(walk)).collect()
+            }
+        }
+    }
+    portions.iter().flat_map(Portion::ops).flat_map(walk).collect()
+}
+
 /// The resource that recalls a history, when some pass reads it.
 fn recalled(ops: &Ops, given: &[ResourceId], wanted: &str) -> Option<ResourceId> {
     let of_history = |id: &&ResourceId| matches!(&ops.resources[id.index()].origin, Origin::History { name, .. } if name == wanted);
@@ -268,6 +291,10 @@ struct Player<'a> {
     composer: Composer<'a>,
     /// How many operations read a resource, with one more when it must stay.
     readers: BTreeMap<ResourceId, usize>,
+    /// What some pass takes over the storage of, as the initial value of a state too.
+    overwritten: BTreeSet<ResourceId>,
+    /// What was there before the loop whose body is being played, which every iteration finds as it was.
+    lasting: Vec<ValueId>,
     held: Vec<Held>,
     /// The current step; 0 is before the first.
     time: usize,
@@ -363,22 +390,25 @@ impl<'a> Player<'a> {
         let most = match l.count {
             Count::Fixed(n) | Count::Until { max: n, .. } => n,
         };
-        // A state that never changes is what it was.
-        let (same, changing): (Vec<_>, Vec<_>) = l.states.iter().partition(|s| s.next == s.carried);
+        // A state that never changes is what it was; where something overwrites either, the other is a copy.
+        let (same, changing): (Vec<_>, Vec<_>) = l.states.iter().partition(|s| s.next == s.carried || most == 0);
+        let mut before = Vec::new();
         for state in &same {
-            names.insert(state.result, names[&state.init]);
+            if [state.init, state.result].iter().any(|id| self.overwritten.contains(id)) {
+                let pass = copy_pass(l, state.init, state.result, self.ops);
+                before.push(self.pass(&pass, names)?);
+            } else {
+                names.insert(state.result, names[&state.init]);
+            }
             names.insert(state.carried, names[&state.init]);
         }
         if most == 0 {
-            for state in &changing {
-                names.insert(state.result, names[&state.init]);
-            }
-            return Ok(Vec::new());
+            return Ok(before);
         }
         let mut body = l.body.clone();
         let mut nexts = Vec::new();
         for state in &changing {
-            let next = if self.written_for(&body, state.next, &nexts) {
+            let next = if written_for(&body, state, &nexts) {
                 state.next
             } else {
                 // The copy borrows the name of the result: the same shape, and nothing in the body has it.
@@ -390,11 +420,11 @@ impl<'a> Player<'a> {
         let in_place: Vec<bool> = changing.iter().zip(&nexts).map(|(s, n)| updated_in_place(&body, *n, s.carried)).collect();
 
         // A state updated in place overwrites its initial value: what others still need is copied first.
-        let mut before = Vec::new();
         let mut inits: Vec<ResourceId> = changing.iter().map(|s| s.init).collect();
         for (i, state) in changing.iter().enumerate() {
             let made = matches!(self.ops.resources[state.init.index()].origin, Origin::Pass | Origin::State);
-            if in_place[i] && (!made || self.readers.get(&state.init).is_some_and(|n| *n > 1)) {
+            let needed = !made || self.readers.get(&state.init).is_some_and(|n| *n > 1) || self.lasting.contains(&names[&state.init]);
+            if in_place[i] && needed {
                 let pass = copy_pass(l, state.init, state.carried, self.ops);
                 before.push(self.pass(&pass, names)?);
                 inits[i] = state.carried;
@@ -402,6 +432,7 @@ impl<'a> Player<'a> {
         }
         let start = self.time;
         let outside: Vec<ValueId> = names.values().copied().collect();
+        let lasting = std::mem::replace(&mut self.lasting, outside.clone());
         let mut value_pair = [None, None];
         let mut b = Vec::new();
         let mut a = Vec::new();
@@ -460,15 +491,20 @@ impl<'a> Player<'a> {
                 even = self.region(&body, &mut even_names)?;
             }
         }
+        self.lasting = lasting;
         let end = self.time;
         // What the repeated part uses lives until the loop ends, since the loop comes back to it.
         if most > 1 {
             let repeated = used(&odd).into_iter().chain(used(&even));
             for value in repeated {
-                if outside.contains(&value) || b.contains(&value) || a.contains(&value) || value_pair.contains(&Some(value)) {
+                if outside.contains(&value) || b.contains(&value) || a.contains(&value) {
                     self.held[value.0].to = self.held[value.0].to.max(end);
                 }
             }
+        }
+        // What ends a loop is looked at behind an iteration.
+        for value in value_pair.into_iter().flatten() {
+            self.held[value.0].to = self.held[value.0].to.max(end);
         }
         let mut settle = Vec::new();
         for (i, state) in changing.iter().enumerate() {
@@ -509,11 +545,15 @@ impl<'a> Player<'a> {
         }));
         Ok(before)
     }
+}
 
-    /// Whether a pass of the body writes this resource, and no other state claims it already.
-    fn written_for(&self, body: &[Op], next: ResourceId, claimed: &[ResourceId]) -> bool {
-        !claimed.contains(&next) && body.iter().any(|op| matches!(op, Op::Pass(p) if p.writes.iter().any(|w| w.resource == next)))
-    }
+/// Whether a pass of the body writes the next value of a state into storage of the state's own: not in the place of something
+/// else that the body makes, nor where another state has it already.
+fn written_for(body: &[Op], state: &State, claimed: &[ResourceId]) -> bool {
+    let writes = body.iter().filter_map(|op| if let Op::Pass(p) = op { Some(&p.writes) } else { None });
+    let write = writes.flatten().find(|w| w.resource == state.next);
+    let own = |w: &PassWrite| w.in_place_of.is_none() || updated_in_place(body, state.next, state.carried);
+    !claimed.contains(&state.next) && write.is_some_and(own)
 }
 
 /// Whether `next` is `carried`, updated in place by one pass after another.

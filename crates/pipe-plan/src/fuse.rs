@@ -96,12 +96,15 @@ fn region(list: Vec<Op>, ops: &Ops, outside: &BTreeSet<ResourceId>, how: (&Limit
 fn share_equal(list: Vec<Op>, outside: &BTreeSet<ResourceId>, log: &mut Vec<String>) -> Vec<Op> {
     let mut renamed: BTreeMap<ResourceId, ResourceId> = BTreeMap::new();
     let mut kept: Vec<Op> = Vec::with_capacity(list.len());
+    // Of what is overwritten, everyone needs a copy of their own.
+    let overwritten: BTreeSet<ResourceId> = list.iter().flat_map(Op::takes_over).collect();
+    let lasts = |pass: &KernelPass| pass.writes.iter().all(|w| w.in_place_of.is_none() && !overwritten.contains(&w.resource));
     for mut op in list {
         rename(&mut op, &renamed);
         if let Op::Pass(pass) = &op {
-            let free = pass.writes.iter().all(|w| !outside.contains(&w.resource) && w.in_place_of.is_none());
+            let free = lasts(pass) && pass.writes.iter().all(|w| !outside.contains(&w.resource));
             let twin = kept.iter().find_map(|other| match other {
-                Op::Pass(other) if free && same_work(pass, other) => Some(other),
+                Op::Pass(other) if free && lasts(other) && same_work(pass, other) => Some(other),
                 _ => None,
             });
             if let Some(twin) = twin {
@@ -119,11 +122,7 @@ fn share_equal(list: Vec<Op>, outside: &BTreeSet<ResourceId>, log: &mut Vec<Stri
 
 fn same_work(a: &KernelPass, b: &KernelPass) -> bool {
     let ports = |p: &KernelPass| -> Vec<(String, Access)> { p.writes.iter().map(|w| (w.port.clone(), w.access)).collect() };
-    a.stages == b.stages
-        && a.reads == b.reads
-        && a.grid == b.grid
-        && ports(a) == ports(b)
-        && b.writes.iter().all(|w| w.in_place_of.is_none())
+    a.stages == b.stages && a.reads == b.reads && a.grid == b.grid && ports(a) == ports(b)
 }
 
 fn rename(op: &mut Op, names: &BTreeMap<ResourceId, ResourceId>) {
@@ -208,7 +207,12 @@ impl Fusion<'_> {
         }
         let [c] = self.readers(p, result)[..] else { return false };
         let Some(consumer) = self.pass(c) else { return false };
-        let fused = match self.may_fold(producer, consumer, result) {
+        let may = if self.overwritten(p, c) {
+            Err("what it reads is overwritten between".to_owned())
+        } else {
+            self.may_fold(producer, consumer, result)
+        };
+        let fused = match may {
             Ok(()) => fold(producer, consumer, result),
             Err(why) => {
                 let note = format!("{} stays before {}: {why}", producer.name, consumer.name);
@@ -249,7 +253,7 @@ impl Fusion<'_> {
         }
         let fused = |c: &usize| {
             let consumer = self.pass(*c)?;
-            let may = taps(consumer, result) == Ok(1) && self.may_fold(producer, consumer, result).is_ok();
+            let may = taps(consumer, result) == Ok(1) && !self.overwritten(p, *c) && self.may_fold(producer, consumer, result).is_ok();
             may.then(|| fold(producer, consumer, result)).filter(|fused| within_limits(fused, self.ops, self.limits))
         };
         let Some(fused) = readers.iter().map(fused).collect::<Option<Vec<_>>>() else { return false };
@@ -304,9 +308,8 @@ impl Fusion<'_> {
             if !(feeds || shares) || (feeds && half) || first.stages.len() + second.stages.len() > MOST_STAGES {
                 continue;
             }
-            // It will stand where the second stood: everything that the second needs is there. What lies between may neither
-            // need the first, nor lead from it to the second.
-            if self.needed_between(a, b) || self.way_between(a, b) {
+            // It will stand where the second stood: everything that the second needs is there.
+            if self.held_up(a, b) {
                 continue;
             }
             let joined = join(first, second);
@@ -320,22 +323,15 @@ impl Fusion<'_> {
         false
     }
 
-    /// Whether some operation between `a` and `b` depends on `a` and `b` depends on it.
-    fn way_between(&self, a: usize, b: usize) -> bool {
-        let mut tainted: BTreeSet<ResourceId> = self.list[a].results().into_iter().collect();
-        let own = tainted.clone();
-        for i in a + 1..b {
-            if self.list[i].sources().iter().any(|s| tainted.contains(s)) {
-                tainted.extend(self.list[i].results());
-            }
-        }
-        self.list[b].sources().iter().any(|s| tainted.contains(s) && !own.contains(s))
+    /// Whether something behind `a`, up to `b`, takes over the storage of what `a` reads.
+    fn overwritten(&self, a: usize, b: usize) -> bool {
+        let read = self.list[a].sources();
+        (a + 1..=b).any(|i| self.list[i].takes_over().iter().any(|id| read.contains(id)))
     }
 
-    /// Whether something between `a` and `b` reads what `a` makes.
-    fn needed_between(&self, a: usize, b: usize) -> bool {
-        let own = self.list[a].results();
-        (a + 1..b).any(|i| self.list[i].sources().iter().any(|s| own.contains(s)))
+    /// Whether something between `a` and `b` must come behind `a`, so that `a` cannot move to `b`.
+    fn held_up(&self, a: usize, b: usize) -> bool {
+        (a + 1..b).any(|i| self.list[i].comes_behind(&self.list[a]))
     }
 }
 

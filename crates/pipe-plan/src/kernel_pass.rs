@@ -220,6 +220,20 @@ impl Op {
         }
     }
 
+    /// Resources from outside whose storage it takes over: a loop copies what others need.
+    pub(crate) fn takes_over(&self) -> Vec<ResourceId> {
+        match self {
+            Self::Pass(pass) => pass.writes.iter().filter_map(|w| w.in_place_of).collect(),
+            Self::Loop(_) => Vec::new(),
+        }
+    }
+
+    /// Whether it must run behind an earlier operation: it reads what that one makes, or overwrites what that one reads.
+    pub(crate) fn comes_behind(&self, earlier: &Self) -> bool {
+        let meet = |needed: &[ResourceId], there: &[ResourceId]| needed.iter().any(|id| there.contains(id));
+        meet(&self.sources(), &earlier.results()) || meet(&self.takes_over(), &earlier.sources())
+    }
+
     /// Resources that later operations may read.
     pub(crate) fn results(&self) -> Vec<ResourceId> {
         match self {

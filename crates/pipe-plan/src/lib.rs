@@ -16,6 +16,8 @@ pub mod lower;
 pub mod plan;
 mod print;
 mod prune;
+#[cfg(test)]
+mod random;
 mod schedule;
 mod tile;
 mod window;

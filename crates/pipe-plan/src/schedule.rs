@@ -95,11 +95,8 @@ impl Problem {
         }
         // A write in the place of another resource must come after every other reader of that resource.
         for (i, op) in list.iter().enumerate() {
-            let Op::Pass(pass) = op else { continue };
-            for old in pass.writes.iter().filter_map(|w| w.in_place_of) {
-                if let Some(t) = tracked.get(&old) {
-                    before[i].extend(t.readers.iter().copied().filter(|r| *r != i));
-                }
+            for old in op.takes_over() {
+                before[i].extend((0..list.len()).filter(|r| *r != i && list[*r].sources().contains(&old)));
             }
         }
         Self { before, resources: tracked.into_values().collect(), count: list.len() }

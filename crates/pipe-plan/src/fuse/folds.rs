@@ -52,14 +52,12 @@ impl Fusion<'_> {
         Ok(joined)
     }
 
-    /// Which operations behind `a`, up to `b`, depend on it.
+    /// Which operations behind `a`, up to `b`, must stay behind it.
     fn behind(&self, a: usize, b: usize) -> BTreeSet<usize> {
-        let mut tainted: BTreeSet<ResourceId> = self.list[a].results().into_iter().collect();
         let mut behind = BTreeSet::new();
         for i in a + 1..=b {
-            if self.list[i].sources().iter().any(|s| tainted.contains(s)) {
+            if self.list[i].comes_behind(&self.list[a]) || behind.iter().any(|j: &usize| self.list[i].comes_behind(&self.list[*j])) {
                 behind.insert(i);
-                tainted.extend(self.list[i].results());
             }
         }
         behind
