@@ -6,8 +6,10 @@ use std::cell::RefCell;
 use pipe_graph::graph::Graph;
 use pipe_graph::pass::{Limits, Profile};
 use pipe_graph::reference::{Raster, Tensor};
+use pipe_graph::rim::{PixelForm, Sample, Transfer};
+use pipe_graph::types::{EdgeType, ImageType};
 use pipe_plan::lower::{Rim, lower};
-use pipe_plan::{Options, Phase, Plan};
+use pipe_plan::{Options, Phase, Plan, plan_graph};
 use pipe_tests::bench::{Bench, compile, plan, reference};
 use pipe_tests::source::{edge, edge_type};
 use proptest::prelude::*;
@@ -270,4 +272,26 @@ fn a_graph_of_500_nodes_is_planned() {
     let plan = planned(&graph, &Limits::default(), true);
     println!("{} passes in {:.1} ms", plan.pass_count(), started.elapsed().as_secs_f64() * 1e3);
     assert!(plan.peak_bytes < plan.naive_bytes);
+}
+
+/// What a file of halves holds, and what only moves it or chooses among it, takes half of the memory and loses nothing; what is
+/// computed takes all of its bits.
+#[test]
+fn halves_are_stored_as_halves() {
+    let text = r#"Graph(version: 1, inputs: {"in": Image}, nodes: {"f": Flip(image: "in"), "m": Median(image: "f", radius: 1),
+        "turned": Rotate90(image: "m"), "b": GaussianBlur(image: "turned", sigma: 1)}, outputs: {"out": "b", "turned": "turned"})"#;
+    let size = [40, 30];
+    let graph = compile(text, &[("in", EdgeType::Image(ImageType::new(size, 4)))]).unwrap_or_else(|e| panic!("{e}"));
+    let form = PixelForm { sample: Sample::F16, ..PixelForm::linear(size, 4) };
+    let formats = |form: PixelForm| {
+        let rim = Rim { inputs: [("in".to_owned(), form)].into_iter().collect(), ..Rim::default() };
+        let plan = plan_graph(&graph, &rim, &Limits::default(), &Options { keep: true, ..Options::default() }, &|_| true);
+        let plan = plan.unwrap_or_else(|e| panic!("{e}"));
+        let count = |format: &str| plan.slots.iter().filter(|s| s.storage.format() == format).count();
+        [count("rgba16float"), count("rgba32float")]
+    };
+    assert_eq!(formats(form), [4, 2]);
+    // A curve, or other primaries, makes numbers that no half is.
+    assert_eq!(formats(PixelForm { transfer: Transfer::Srgb, ..form }), [0, 6]);
+    assert_eq!(formats(PixelForm::linear(size, 4)), [0, 6]);
 }

@@ -15,7 +15,7 @@ use crate::field::{Accepts, Driven, EdgeIndex, Image, In, Mesh};
 use crate::node::{Mistake, as_image};
 use crate::pass::{
     Access, Border, Constant, Count, Entry, Filter, Grid, Item, Kept, Limits, Loop, NodeLabel, Origin, Pass, PassGraph, Reach, Read,
-    Resource, ResourceId, Shader, Shape, State, Value, Write,
+    Resource, ResourceId, Shader, Shape, State, Value, Values, Write,
 };
 use crate::types::{EdgeType, ImageType};
 
@@ -291,6 +291,7 @@ impl<'a> Lowering<'a> {
             params: IndexMap::new(),
             constants: IndexMap::new(),
             grid: Grid::Cover,
+            values: Values::Any,
         };
         PassBuilder { cx: self, pass }
     }
@@ -389,6 +390,12 @@ impl PassBuilder<'_, '_> {
     /// How many; `Cover` unless said.
     pub fn grid(mut self, grid: Grid) -> Self {
         self.pass.grid = grid;
+        self
+    }
+
+    /// What is known of its values; `Any` unless said.
+    pub fn values(mut self, values: Values) -> Self {
+        self.pass.values = values;
         self
     }
 

@@ -366,6 +366,18 @@ pub enum Constant {
     Bool(bool),
 }
 
+/// What is known of the values that a pass makes; it decides how they are stored.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+pub enum Values {
+    /// Anything.
+    #[default]
+    Any,
+    /// Numbers that half floats hold exactly.
+    Halves,
+    /// Numbers that it read in its images, and 0 and 1.
+    Read,
+}
+
 /// One shader call over a grid.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Pass {
@@ -387,6 +399,8 @@ pub struct Pass {
     pub constants: IndexMap<String, Constant>,
     /// How many.
     pub grid: Grid,
+    /// What is known of its values.
+    pub values: Values,
 }
 
 impl Pass {

@@ -17,7 +17,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
 
-use pipe_graph::pass::{Access, Count, Entry, Grid, Limits, Origin, Reach, ResourceId, Shader, Shape, State, Value};
+use pipe_graph::pass::{Access, Count, Entry, Grid, Limits, Origin, Reach, ResourceId, Shader, Shape, State, Value, Values};
 use pipe_graph::types::Precision;
 
 use crate::compose::{Composed, Composer, Cover, Place, Placed};
@@ -616,6 +616,7 @@ fn copy_pass(l: &LoopOp, from: ResourceId, to: ResourceId, ops: &Ops) -> KernelP
         constants: indexmap::IndexMap::new(),
         params: indexmap::IndexMap::<String, Value>::new(),
         ports: vec![port],
+        values: Values::Read,
         shape,
     };
     let write = PassWrite { stage: 0, port: "out".into(), resource: to, access: Access::Store, in_place_of: None };

@@ -7,7 +7,7 @@
 use indexmap::IndexMap;
 use pipe_graph::pass::{
     Access, Border, Constant, Count, Entry, Filter, Grid, Item, NodeLabel, Pass, PassGraph, Reach, Resource, ResourceId, Shader, Shape,
-    State, Value, Workspace,
+    State, Value, Values, Workspace,
 };
 
 use crate::window::Windows;
@@ -51,6 +51,7 @@ pub(crate) struct Stage {
     pub(crate) constants: IndexMap<String, Constant>,
     pub(crate) params: IndexMap<String, Value>,
     pub(crate) ports: Vec<StagePort>,
+    pub(crate) values: Values,
     /// The shape of its result; of its first output when it stores by itself.
     pub(crate) shape: Shape,
 }
@@ -113,6 +114,7 @@ impl KernelPass {
             constants: pass.constants.clone(),
             params: pass.params.clone(),
             ports,
+            values: pass.values,
             shape: graph.resource(pass.writes[0].resource).shape,
         };
         let write = |w: &pipe_graph::pass::Write| PassWrite {

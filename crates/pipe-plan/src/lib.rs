@@ -13,6 +13,7 @@ mod error;
 mod fuse;
 mod kernel_pass;
 pub mod lower;
+mod narrow;
 pub mod plan;
 mod print;
 mod prune;
@@ -95,7 +96,7 @@ pub fn after(graph: PassGraph, phase: Phase, fuse: bool, limits: &Limits) -> Str
         let lines: String = decisions.iter().map(|d| format!("{d}\n")).collect();
         return format!("{}\n{lines}", print::ops(&ops));
     }
-    let Schedule { ops, portions } = schedule::schedule(ops);
+    let Schedule { ops, portions } = schedule::schedule(narrow::narrow(ops));
     let list = portions.into_iter().flat_map(|p| p.ops().to_vec()).collect();
     print::ops(&kernel_pass::Ops { ops: list, ..ops })
 }
@@ -135,5 +136,6 @@ pub fn plan_graph(graph: &Graph, rim: &Rim, limits: &Limits, options: &Options, 
 }
 
 fn ordered(ops: kernel_pass::Ops, limits: &Limits, options: &Options, thrift: Thrift) -> Schedule {
-    schedule::schedule(if options.fuse { fuse::fuse(ops, limits, thrift).0 } else { ops })
+    let ops = if options.fuse { fuse::fuse(ops, limits, thrift).0 } else { ops };
+    schedule::schedule(narrow::narrow(ops))
 }

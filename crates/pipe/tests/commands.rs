@@ -361,3 +361,34 @@ fn frames_remember_as_many_frames_as_they_say() {
         assert_eq!([1, 2, 3, 4].map(|frame| first(output, frame)), expected, "{output}");
     }
 }
+
+/// Every half goes through passes that store it, to the bit; of NaN only that it is none.
+#[test]
+fn every_half_comes_out_as_it_went_in() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let folder = folder.path();
+    let form = pipe_io::Form {
+        sample: pipe_io::Sample::F16,
+        layout: pipe_io::Layout::Planar,
+        channels: pipe_io::Channels::Y,
+        alpha: pipe_io::Alpha::None,
+        colour: pipe_io::Colour::LINEAR_REC709,
+    };
+    let halves: Vec<u8> = (0..=u16::MAX).flat_map(u16::to_ne_bytes).collect();
+    let picture = form.picture(256, 256, halves.clone(), pipe_io::Metadata::default());
+    let path = |name: &str| folder.join(name).to_string_lossy().into_owned();
+    let target = pipe_io::Target::parse(&path("in.exr")).expect("a target");
+    let options = pipe_io::WriteOptions { channels: Some(pipe_io::Channels::Y), ..pipe_io::WriteOptions::default() };
+    pipe_io::write(&target, &picture, &options).expect("written");
+    let graph =
+        r#"Graph(version: 1, inputs: {"in": Image}, outputs: {"out": "b"}, nodes: {"a": Flip(image: "in"), "b": Flip(image: "a")})"#;
+    fs::write(folder.join("twice.ron"), graph).expect("written");
+    succeeds(folder, &["run", "twice.ron", "in.exr", "out.exr"]);
+    let got = pipe_io::read(&pipe_io::Source::parse(&path("out.exr")), &pipe_io::ReadOptions::default()).expect("read");
+    assert_eq!(got.sample, pipe_io::Sample::F16);
+    let is_nan = |h: u16| h & 0x7c00 == 0x7c00 && h & 0x3ff != 0;
+    for (a, b) in halves.chunks_exact(2).zip(got.bytes.chunks_exact(2)) {
+        let (a, b) = (u16::from_ne_bytes([a[0], a[1]]), u16::from_ne_bytes([b[0], b[1]]));
+        assert!(a == b || is_nan(a) && is_nan(b), "{a:#06x} became {b:#06x}");
+    }
+}

@@ -151,6 +151,12 @@ impl PixelForm {
         }
     }
 
+    /// Whether decoded pixels are the halves that the file holds.
+    pub fn keeps_halves(&self) -> bool {
+        let plain = Self::linear(self.size, self.channels);
+        self.sample == Sample::F16 && self.transfer == Transfer::Linear && self.alpha != Alpha::Straight && self.matrix == plain.matrix
+    }
+
     /// Bytes of all samples, without padding.
     pub const fn bytes(&self) -> u64 {
         self.size[0] as u64 * self.size[1] as u64 * self.channels as u64 * self.sample.bytes()

@@ -7,7 +7,7 @@ use std::ops::Range;
 
 use super::{Alpha, Layout, PixelForm, Sample, Transfer, Voxel, VoxelForm};
 use crate::lowering::{Lowering, PassBuilder};
-use crate::pass::{Access, Entry, Fetch, Grid, Limits, Origin, Reach, Resource, ResourceId, Shader, Shape};
+use crate::pass::{Access, Entry, Fetch, Grid, Limits, Origin, Reach, Resource, ResourceId, Shader, Shape, Values};
 use crate::types::{ImageType, Precision, VolumeType};
 
 macro_rules! shader {
@@ -109,7 +109,8 @@ pub fn ingest_image(cx: &mut Lowering<'_>, name: &str, form: &PixelForm) -> Reso
             "fn each(xy: vec2i) { store_out(vec2i(xy.x, FIRST_ROW + xy.y), decode(xy.x, xy.y)); }"
         };
         let pass = cx.pass("decode", shader!("io/ingest", format!("{}{tail}\n", word_function(ports.len()))));
-        let mut pass = describe(pass, form).constant("FIRST_ROW", band.rows.start as i32);
+        let values = if form.keeps_halves() { Values::Halves } else { Values::Any };
+        let mut pass = describe(pass, form).constant("FIRST_ROW", band.rows.start as i32).values(values);
         for (c, port) in ports.into_iter().enumerate() {
             pass = pass.read(&format!("c{c}"), port, Reach::Point);
         }

@@ -73,6 +73,7 @@ impl Node for Crop {
         cx.pass("", shader!("composite/crop"))
             .read("image", image, Reach::Whole)
             .write("out", out)
+            .values(Values::Read)
             .param("origin", [self.x as i32, self.y as i32])
             .add();
         Ok(())

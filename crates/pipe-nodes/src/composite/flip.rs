@@ -49,6 +49,7 @@ impl Node for Flip {
         cx.pass("", shader!("composite/flip"))
             .read("image", image, Reach::Whole)
             .write("out", out)
+            .values(Values::Read)
             .constant("X", self.direction != Direction::Vertical)
             .constant("Y", self.direction != Direction::Horizontal)
             .add();

@@ -50,6 +50,7 @@ impl Node for Offset {
         cx.pass("", shader!("composite/offset"))
             .read_with("image", image, Reach::Whole, border, Filter::Nearest)
             .write("out", out)
+            .values(Values::Read)
             .param("offset", [self.x, self.y])
             .add();
         Ok(())

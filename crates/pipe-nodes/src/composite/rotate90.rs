@@ -49,7 +49,12 @@ impl Node for Rotate90 {
             return Ok(());
         }
         let out = cx.output("out");
-        cx.pass("", shader!("composite/rotate90")).read("image", image, Reach::Whole).write("out", out).constant("TURNS", turns).add();
+        cx.pass("", shader!("composite/rotate90"))
+            .read("image", image, Reach::Whole)
+            .write("out", out)
+            .values(Values::Read)
+            .constant("TURNS", turns)
+            .add();
         Ok(())
     }
 

@@ -50,7 +50,11 @@ impl Node for Median {
 
     fn lower(&self, cx: &mut Lowering<'_>) -> Result<(), Mistake> {
         let (image, out) = (cx.input(&self.image), cx.output("out"));
-        cx.pass("", self.shader()).read("image", image, Reach::Around(self.radius, self.radius)).write("out", out).add();
+        cx.pass("", self.shader())
+            .read("image", image, Reach::Around(self.radius, self.radius))
+            .write("out", out)
+            .values(Values::Read)
+            .add();
         Ok(())
     }
 

@@ -8,7 +8,7 @@ use std::collections::BTreeSet;
 use indexmap::IndexMap;
 use pipe_graph::pass::{
     Access, Border, Constant, Count, Entry, Fetch, Filter, Grid, Item, Kept, Loop, NodeLabel, Origin, Pass, PassGraph, Reach, Read,
-    Resource, ResourceId, Shader, Shape, State, Value, Walk, Workspace, Write,
+    Resource, ResourceId, Shader, Shape, State, Value, Values, Walk, Workspace, Write,
 };
 use pipe_graph::types::{ImageType, Precision, VolumeType};
 
@@ -199,7 +199,18 @@ impl Maker {
         }
         let text = self.numbers.below(3);
         let shader = Shader::builtin(&format!("random/{text}.wgsl"), &format!("// {text}"));
-        self.emit(Pass { name: String::new(), node: NodeLabel(0), shader, entry, reads, writes: made, params, constants, grid });
+        self.emit(Pass {
+            name: String::new(),
+            node: NodeLabel(0),
+            shader,
+            entry,
+            reads,
+            writes: made,
+            params,
+            constants,
+            grid,
+            values: Values::Any,
+        });
     }
 
     /// Gives a pass its name and puts it behind the others.
