@@ -15,7 +15,6 @@
 //! freed last; for intervals that uses exactly as many slots as are alive at once.
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::ops::Range;
 
 use pipe_graph::pass::{Access, Count, Entry, Grid, Limits, Origin, Reach, ResourceId, Shader, Shape, State, Value};
 use pipe_graph::types::Precision;
@@ -24,7 +23,7 @@ use crate::compose::{Composed, Composer, Cover, Place, Placed};
 use crate::kernel_pass::{Brought, KernelPass, LoopOp, Op, Ops, PassWrite, Portion, Source, Stage, StagePort, TilingOp};
 use crate::plan::{Crossing, Fetched, History, Plan, Rect, Repeat, Run, Slot, SlotId, Step, Storage, Tile, Tiling, Times, Upload};
 use crate::schedule::Schedule;
-use crate::window::{Halo, Windows};
+use crate::window::Windows;
 use crate::{Options, PlanError};
 
 /// What a device of unknown memory is taken to have when it is about keeping results.
@@ -645,31 +644,12 @@ struct Launched {
     places: Vec<Place>,
     cover: Cover,
     uniform_offset: u32,
-    /// Whether it writes images or pixels of files.
-    makes_pixels: bool,
 }
 
 impl Launched {
-    /// The part of the grid that a tile runs: pixels, blocks, or (along x alone) groups of pixels of a file.
-    fn grid(&self, windows: &Windows, tile: &Rect) -> Rect {
-        let written = self.pass.writes.iter().filter_map(|w| windows.halos.get(&w.resource));
-        let halo = written.copied().reduce(Halo::union);
-        let covered = windows.widened(tile, halo.unwrap_or_default());
-        match (self.pass.block(), self.pass.grid) {
-            (Some(block), _) => {
-                // A block that makes pixels runs wherever the window meets it; others in the tile that they begin in.
-                let first = |n: u32, i: usize| if self.makes_pixels { n / block[i] } else { n.div_ceil(block[i]) };
-                let axis = |range: &Range<u32>, i: usize| first(range.start, i)..range.end.div_ceil(block[i]);
-                Rect { x: axis(&covered.x, 0), y: axis(&covered.y, 1) }
-            }
-            (_, Grid::Pixels(per)) => Rect { x: 0..(covered.area().div_ceil(per.into())) as u32, y: 0..1 },
-            _ => covered,
-        }
-    }
-
     /// Writes its words of the uniform buffer for a tile, and answers its workgroups.
-    fn place(&self, windows: &Windows, tile: &Rect, uniforms: &mut Vec<(u32, i32)>) -> [u32; 3] {
-        let grid = self.grid(windows, tile);
+    fn place(&self, ops: &Ops, windows: &Windows, tile: &Rect, uniforms: &mut Vec<(u32, i32)>) -> [u32; 3] {
+        let grid = self.pass.grid_in(ops, windows, tile);
         let origin = |r: &Rect| [r.x.start as i32, r.y.start as i32];
         for place in &self.places {
             let [x, y] = match place.what {
@@ -712,8 +692,7 @@ impl Writer<'_> {
         let writes: Vec<ResourceId> = pass.writes.iter().map(|w| w.resource).collect();
         let bytes = reads.iter().chain(&writes).map(|id| self.ops.shape(*id).bytes()).sum();
         self.bytes_moved += bytes;
-        let makes_pixels = writes.iter().any(|id| self.ops.shape(*id).plane().is_some());
-        self.placed.push(Launched { pass: pass.clone(), places: composed.places, cover: composed.cover, uniform_offset, makes_pixels });
+        self.placed.push(Launched { pass: pass.clone(), places: composed.places, cover: composed.cover, uniform_offset });
         Run {
             name: pass.name.clone(),
             nodes: pass.nodes.iter().map(|n| self.ops.nodes[n.0 as usize].clone()).collect(),
@@ -744,7 +723,7 @@ impl Writer<'_> {
         };
         let one = |tile: &Rect| {
             let mut uniforms = Vec::new();
-            let groups = launched.iter().map(|l| l.place(&t.windows, tile, &mut uniforms)).collect();
+            let groups = launched.iter().map(|l| l.place(self.ops, &t.windows, tile, &mut uniforms)).collect();
             let cross = |list: &[(Brought, ValueId)]| list.iter().map(|b| crossing(b, tile)).collect();
             Tile { uploads: cross(&t.uploads), uniforms, groups, fetches: cross(&t.fetches) }
         };
