@@ -4,6 +4,7 @@
 mod graphs;
 mod machine;
 mod meaning;
+mod tiles;
 
 use std::collections::BTreeSet;
 
@@ -15,7 +16,7 @@ use crate::fuse::{Thrift, fuse};
 use crate::kernel_pass::Ops;
 use crate::prune::prune;
 use crate::schedule::{Schedule, schedule};
-use crate::{Options, Phase, after, allocate};
+use crate::{Options, Phase, after, allocate, tile};
 use graphs::Choice;
 use meaning::{Ending, Meaning};
 
@@ -91,6 +92,31 @@ fn slots_hold_what_a_graph_means() {
                         return Err(format!("{how}, keep {keep}, {ending:?}: other values of {unlike:?}\n{}", plan.to_text()));
                     }
                 }
+            }
+        }
+        Ok(())
+    });
+}
+
+/// Tiles make what whole images are: every pixel of valid pixels alone, every block of a reduction once, in slots that hold
+/// what the graph means.
+#[test]
+fn tiles_hold_what_a_graph_means() {
+    check(4_000, |recipe| {
+        let graph = graphs::graph(&recipe);
+        let ops = Ops::new(graph.clone());
+        let limits = limits(&recipe);
+        let expected = machine::expected(&ops, Ending::Latest);
+        let details = recipe.iter().fold(0_u64, |all, (_, details)| all.rotate_left(5) ^ details);
+        let step = [5 + details % 48, 3 + details / 64 % 30].map(|n| n as u32);
+        for (how, schedule) in schedules(graph, &limits) {
+            let schedule = tile::cut_in(schedule, step);
+            let in_tiles = |why: String| format!("{how}, in tiles of {step:?}: {why}");
+            tiles::check(&schedule).map_err(in_tiles)?;
+            let plan = allocate::allocate("random", schedule.clone(), &limits, &Options::default()).map_err(|e| e.to_string())?;
+            let unlike = machine::play(&plan, &schedule, Ending::Latest).map_err(in_tiles)?.unlike(&expected);
+            if !unlike.is_empty() {
+                return Err(in_tiles(format!("other values of {unlike:?}\n{}", plan.to_text())));
             }
         }
         Ok(())
