@@ -760,3 +760,38 @@ impl Writer<'_> {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use pipe_graph::types::ImageType;
+    use proptest::prelude::*;
+
+    use super::*;
+
+    proptest! {
+        #![proptest_config(ProptestConfig { cases: 2000, failure_persistence: None, ..ProptestConfig::default() })]
+
+        /// No two values that live at the same moment share a slot, and of each storage there are as many slots as values that
+        /// live at once.
+        #[test]
+        fn slots_are_shared_by_values_that_do_not_meet(intervals in prop::collection::vec((0_usize..60, 0_usize..12, 0_u32..3), 1..60)) {
+            let storage = |n: u32| Storage::Image(ImageType::new([8 << n, 8], 4));
+            let one = |(from, steps, n): &(usize, usize, u32)| {
+                Held { resource: ResourceId(0), storage: storage(*n), from: *from, to: from + steps }
+            };
+            let held: Vec<Held> = intervals.iter().map(one).collect();
+            let (slot_of, slots) = colour(&held, true);
+            for (i, a) in held.iter().enumerate() {
+                prop_assert_eq!(slots[slot_of[i].0 as usize].storage, a.storage);
+                for (j, b) in held.iter().enumerate().skip(i + 1) {
+                    prop_assert!(slot_of[i] != slot_of[j] || a.to < b.from || b.to < a.from);
+                }
+            }
+            for n in 0..3 {
+                let alive = |t: usize| held.iter().filter(|h| h.storage == storage(n) && (h.from..=h.to).contains(&t)).count();
+                let most = (0..72).map(alive).max().unwrap_or(0);
+                prop_assert_eq!(slots.iter().filter(|s| s.storage == storage(n)).count(), most);
+            }
+        }
+    }
+}
