@@ -61,7 +61,7 @@ pub(crate) fn plan(name: &str, schedule: &Schedule, limits: &Limits, options: &O
         match crate::allocate::allocate(name, streams.cut(schedule.ops.clone(), candidate.step), limits, options) {
             Ok(plan) => return Ok(plan),
             Err(error) if error.is_about_size() => {
-                reason = Some(format!("with tiles of {}x{}, {error}", candidate.step[0], candidate.step[1]))
+                reason = Some(format!("with tiles of {}x{}, {error}", candidate.step[0], candidate.step[1]));
             }
             Err(error) => return Err(error.to_string()),
         }
@@ -428,7 +428,7 @@ impl Streams {
     /// leaves only tables runs a block in the tile that it begins in.
     fn to_blocks(&self, pass: &KernelPass, ops: &Ops, block: [u32; 2], step: [u32; 2]) -> Halo {
         let makes_pixels = pass.makes_pixels(ops);
-        let beyond = |i: usize| if step[i] % block[i] == 0 && !makes_pixels { 0 } else { block[i] - 1 };
+        let beyond = |i: usize| if step[i].is_multiple_of(block[i]) && !makes_pixels { 0 } else { block[i] - 1 };
         let after = [beyond(0), beyond(1)];
         Halo { before: if makes_pixels { after } else { [0, 0] }, after }
     }

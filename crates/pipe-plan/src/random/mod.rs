@@ -41,8 +41,8 @@ fn check(cases: u32, test: impl Fn(Vec<Choice>) -> Result<(), String>) {
 }
 
 fn limits(recipe: &[Choice]) -> Limits {
-    let profile = if recipe.len() % 2 == 0 { Profile::Gpu } else { Profile::Cpu };
-    Limits { profile, half_storage: recipe.len() % 3 != 0, ..Limits::default() }
+    let profile = if recipe.len().is_multiple_of(2) { Profile::Gpu } else { Profile::Cpu };
+    Limits { profile, half_storage: !recipe.len().is_multiple_of(3), ..Limits::default() }
 }
 
 /// All ways to a schedule, named.
