@@ -148,7 +148,7 @@ fn a_budget_decides() {
     let flip = r#"Graph(version: 1, inputs: {"in": Image}, nodes: {"a": Exposure(image: "in", ev: 1), "turned": Rotate90(image: "a")}, outputs: {"out": "turned"})"#;
     let flip = compile(flip, &types).unwrap_or_else(|e| panic!("{e}"));
     let message = with(&flip, 1 << 20).expect_err("a rotated image is held whole");
-    assert!(message.contains("needs 4.0 MiB whole, since turned reads it from anywhere"), "{message}");
+    assert!(message.contains("needs 4.0 MiB whole, since `turned` reads it from anywhere"), "{message}");
 }
 
 /// The plan is the same however often it is made, and a wide image is cut along x where textures are narrow.

@@ -15,7 +15,6 @@
 //! freed last; for intervals that uses exactly as many slots as are alive at once.
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::ops::Range;
 
 use pipe_graph::pass::{Access, Count, Entry, Grid, Limits, Origin, Reach, ResourceId, Shader, Shape, State, Value, Values};
 use pipe_graph::types::Precision;
@@ -24,7 +23,7 @@ use crate::compose::{Composed, Composer, Cover, Place, Placed};
 use crate::kernel_pass::{Brought, KernelPass, LoopOp, Op, Ops, PassWrite, Portion, Source, Stage, StagePort, TilingOp};
 use crate::plan::{Crossing, Fetched, History, Plan, Rect, Repeat, Run, Slot, SlotId, Step, Storage, Tile, Tiling, Times, Upload};
 use crate::schedule::Schedule;
-use crate::window::{Halo, Windows};
+use crate::window::Windows;
 use crate::{Options, PlanError};
 
 /// What a device of unknown memory is taken to have when it is about keeping results.
@@ -646,31 +645,12 @@ struct Launched {
     places: Vec<Place>,
     cover: Cover,
     uniform_offset: u32,
-    /// Whether it writes images or pixels of files.
-    makes_pixels: bool,
 }
 
 impl Launched {
-    /// The part of the grid that a tile runs: pixels, blocks, or (along x alone) groups of pixels of a file.
-    fn grid(&self, windows: &Windows, tile: &Rect) -> Rect {
-        let written = self.pass.writes.iter().filter_map(|w| windows.halos.get(&w.resource));
-        let halo = written.copied().reduce(Halo::union);
-        let covered = windows.widened(tile, halo.unwrap_or_default());
-        match (self.pass.block(), self.pass.grid) {
-            (Some(block), _) => {
-                // A block that makes pixels runs wherever the window meets it; others in the tile that they begin in.
-                let first = |n: u32, i: usize| if self.makes_pixels { n / block[i] } else { n.div_ceil(block[i]) };
-                let axis = |range: &Range<u32>, i: usize| first(range.start, i)..range.end.div_ceil(block[i]);
-                Rect { x: axis(&covered.x, 0), y: axis(&covered.y, 1) }
-            }
-            (_, Grid::Pixels(per)) => Rect { x: 0..(covered.area().div_ceil(per.into())) as u32, y: 0..1 },
-            _ => covered,
-        }
-    }
-
     /// Writes its words of the uniform buffer for a tile, and answers its workgroups.
-    fn place(&self, windows: &Windows, tile: &Rect, uniforms: &mut Vec<(u32, i32)>) -> [u32; 3] {
-        let grid = self.grid(windows, tile);
+    fn place(&self, ops: &Ops, windows: &Windows, tile: &Rect, uniforms: &mut Vec<(u32, i32)>) -> [u32; 3] {
+        let grid = self.pass.grid_in(ops, windows, tile);
         let origin = |r: &Rect| [r.x.start as i32, r.y.start as i32];
         for place in &self.places {
             let [x, y] = match place.what {
@@ -713,8 +693,7 @@ impl Writer<'_> {
         let writes: Vec<ResourceId> = pass.writes.iter().map(|w| w.resource).collect();
         let bytes = reads.iter().chain(&writes).map(|id| self.ops.shape(*id).bytes()).sum();
         self.bytes_moved += bytes;
-        let makes_pixels = writes.iter().any(|id| self.ops.shape(*id).plane().is_some());
-        self.placed.push(Launched { pass: pass.clone(), places: composed.places, cover: composed.cover, uniform_offset, makes_pixels });
+        self.placed.push(Launched { pass: pass.clone(), places: composed.places, cover: composed.cover, uniform_offset });
         Run {
             name: pass.name.clone(),
             nodes: pass.nodes.iter().map(|n| self.ops.nodes[n.0 as usize].clone()).collect(),
@@ -745,7 +724,7 @@ impl Writer<'_> {
         };
         let one = |tile: &Rect| {
             let mut uniforms = Vec::new();
-            let groups = launched.iter().map(|l| l.place(&t.windows, tile, &mut uniforms)).collect();
+            let groups = launched.iter().map(|l| l.place(self.ops, &t.windows, tile, &mut uniforms)).collect();
             let cross = |list: &[(Brought, ValueId)]| list.iter().map(|b| crossing(b, tile)).collect();
             Tile { uploads: cross(&t.uploads), uniforms, groups, fetches: cross(&t.fetches) }
         };
@@ -779,6 +758,41 @@ impl Writer<'_> {
             even,
             count,
             settle: r.settle.iter().map(|(from, to)| (slot(from), slot(to))).collect(),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use pipe_graph::types::ImageType;
+    use proptest::prelude::*;
+
+    use super::*;
+
+    proptest! {
+        #![proptest_config(ProptestConfig { cases: 2000, failure_persistence: None, ..ProptestConfig::default() })]
+
+        /// No two values that live at the same moment share a slot, and of each storage there are as many slots as values that
+        /// live at once.
+        #[test]
+        fn slots_are_shared_by_values_that_do_not_meet(intervals in prop::collection::vec((0_usize..60, 0_usize..12, 0_u32..3), 1..60)) {
+            let storage = |n: u32| Storage::Image(ImageType::new([8 << n, 8], 4));
+            let one = |(from, steps, n): &(usize, usize, u32)| {
+                Held { resource: ResourceId(0), storage: storage(*n), from: *from, to: from + steps }
+            };
+            let held: Vec<Held> = intervals.iter().map(one).collect();
+            let (slot_of, slots) = colour(&held, true);
+            for (i, a) in held.iter().enumerate() {
+                prop_assert_eq!(slots[slot_of[i].0 as usize].storage, a.storage);
+                for (j, b) in held.iter().enumerate().skip(i + 1) {
+                    prop_assert!(slot_of[i] != slot_of[j] || a.to < b.from || b.to < a.from);
+                }
+            }
+            for n in 0..3 {
+                let alive = |t: usize| held.iter().filter(|h| h.storage == storage(n) && (h.from..=h.to).contains(&t)).count();
+                let most = (0..72).map(alive).max().unwrap_or(0);
+                prop_assert_eq!(slots.iter().filter(|s| s.storage == storage(n)).count(), most);
+            }
         }
     }
 }

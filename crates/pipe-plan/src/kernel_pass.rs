@@ -4,13 +4,16 @@
 //! stage for its value at that place; so fusing two passes is nothing but putting both stages into one pass and
 //! turning a load into such a question. A pass as a node declared it has one stage.
 
+use std::ops::Range;
+
 use indexmap::IndexMap;
 use pipe_graph::pass::{
     Access, Border, Constant, Count, Entry, Filter, Grid, Item, NodeLabel, Pass, PassGraph, Reach, Resource, ResourceId, Shader, Shape,
     State, Value, Values, Workspace,
 };
 
-use crate::window::Windows;
+use crate::plan::Rect;
+use crate::window::{Halo, Windows};
 
 /// Where a port's values come from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -153,6 +156,29 @@ impl KernelPass {
             Grid::Blocks(block) => Some(block),
             Grid::Walk(walk) => Some(walk.tile),
             _ => None,
+        }
+    }
+
+    /// Whether it writes images or pixels of files.
+    pub(crate) fn makes_pixels(&self, ops: &Ops) -> bool {
+        self.writes.iter().any(|w| ops.shape(w.resource).plane().is_some())
+    }
+
+    /// The part of the grid that a tile runs: pixels, blocks, or (along x alone) groups of pixels of a file.
+    pub(crate) fn grid_in(&self, ops: &Ops, windows: &Windows, tile: &Rect) -> Rect {
+        let written = self.writes.iter().filter_map(|w| windows.halos.get(&w.resource));
+        let halo = written.copied().reduce(Halo::union);
+        let covered = windows.widened(tile, halo.unwrap_or_default());
+        match (self.block(), self.grid) {
+            (Some(block), _) => {
+                // A block that makes pixels runs wherever the window meets it; others in the tile that they begin in.
+                let makes_pixels = self.makes_pixels(ops);
+                let first = |n: u32, i: usize| if makes_pixels { n / block[i] } else { n.div_ceil(block[i]) };
+                let axis = |range: &Range<u32>, i: usize| first(range.start, i)..range.end.div_ceil(block[i]);
+                Rect { x: axis(&covered.x, 0), y: axis(&covered.y, 1) }
+            }
+            (_, Grid::Pixels(per)) => Rect { x: 0..(covered.area().div_ceil(per.into())) as u32, y: 0..1 },
+            _ => covered,
         }
     }
 

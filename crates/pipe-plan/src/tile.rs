@@ -15,7 +15,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use pipe_graph::pass::{Border, Count, Entry, Grid, Limits, Origin, Reach, Resource, ResourceId, Shape, State};
+use pipe_graph::pass::{Access, Border, Count, Entry, Grid, Limits, Origin, Reach, Resource, ResourceId, Shape, State};
 
 use crate::error::human;
 use crate::kernel_pass::{Brought, KernelPass, LoopOp, Op, Ops, Portion, Source, Stage, TilingOp};
@@ -72,9 +72,13 @@ pub(crate) fn plan(name: &str, schedule: &Schedule, limits: &Limits, options: &O
 
 /// The plan over tiles of this size; over whole images where nothing can be made in tiles.
 pub(crate) fn plan_in(name: &str, schedule: Schedule, limits: &Limits, options: &Options, step: [u32; 2]) -> Result<Plan, PlanError> {
+    crate::allocate::allocate(name, cut_in(schedule, step), limits, options)
+}
+
+/// The schedule over tiles of this size; as it is where nothing can be made in tiles.
+pub(crate) fn cut_in(schedule: Schedule, step: [u32; 2]) -> Schedule {
     let streams = Streams::of(&schedule);
-    let schedule = if streams.any() { streams.cut(schedule.ops, step.map(|n| n.max(1))) } else { schedule };
-    crate::allocate::allocate(name, schedule, limits, options)
+    if streams.any() { streams.cut(schedule.ops, step.map(|n| n.max(1))) } else { schedule }
 }
 
 /// A size of tiles.
@@ -166,7 +170,8 @@ fn tileable(pass: &KernelPass, ops: &Ops) -> Option<[u32; 2]> {
         Shape::Image(t) => t.size == size && w.in_place_of.is_none(),
         Shape::Pixels { size: own, .. } => own == size,
         Shape::Volume(_) => false,
-        _ => true,
+        // Where tiles overlap, pixels are made twice, but must be counted once.
+        _ => w.access == Access::Store || !pass.makes_pixels(ops),
     });
     (grid && alike).then_some(size)
 }
@@ -426,10 +431,14 @@ impl Streams {
             halos.entry(write.resource).or_default();
         }
         for (read, id) in pass.reads.iter().enumerate().filter(|(_, id)| self.streamed.contains(id)) {
+            // What a block leaves in a table comes from all of its pixels.
+            let leaves_table = pass.writes.iter().any(|w| ops.shape(w.resource).plane().is_none());
             let needed = match (look(pass, read), pass.block()) {
-                (Look::Around(reach), _) => made.plus(Halo::around(reach)),
-                (Look::Block(reach), Some(block)) => made.plus(Halo::around(reach)).plus(self.to_blocks(pass, ops, block, step)),
-                (Look::Block(_) | Look::Whole, _) => unreachable!("what is read from anywhere is not streamed"),
+                (Look::Around(reach), block) if block.is_none() || !leaves_table => made.plus(Halo::around(reach)),
+                (Look::Around(reach) | Look::Block(reach), Some(block)) => {
+                    made.plus(Halo::around(reach)).plus(self.to_blocks(pass, ops, block, step))
+                }
+                _ => unreachable!("what is read from anywhere is not streamed"),
             };
             let known = halos.entry(*id).or_default();
             *known = known.union(needed);
@@ -439,7 +448,7 @@ impl Streams {
     /// How far whole blocks reach beyond a tile. A pass that makes pixels runs each block that the window meets; one that
     /// leaves only tables runs a block in the tile that it begins in.
     fn to_blocks(&self, pass: &KernelPass, ops: &Ops, block: [u32; 2], step: [u32; 2]) -> Halo {
-        let makes_pixels = pass.writes.iter().any(|w| ops.shape(w.resource).plane().is_some());
+        let makes_pixels = pass.makes_pixels(ops);
         let beyond = |i: usize| if step[i].is_multiple_of(block[i]) && !makes_pixels { 0 } else { block[i] - 1 };
         let after = [beyond(0), beyond(1)];
         Halo { before: if makes_pixels { after } else { [0, 0] }, after }
@@ -526,9 +535,17 @@ fn streamed(list: &[Op], ops: &Ops, excluded: &[Held]) -> (BTreeSet<ResourceId>,
     for kept in &ops.kept {
         keep(&mut streamed, kept.resource, "it is kept for the next frame".to_owned());
     }
+    let overwritten: BTreeSet<ResourceId> = list.iter().flat_map(Op::takes_over).collect();
     loop {
         let before = streamed.len();
         for op in list {
+            // A later round would run it again, when that is gone.
+            let own = op.takes_over();
+            if op.sources().iter().any(|id| overwritten.contains(id) && !own.contains(id)) {
+                for id in op.sources().into_iter().chain(op.results()) {
+                    keep(&mut streamed, id, "it is needed together with what is overwritten later".to_owned());
+                }
+            }
             match op {
                 Op::Pass(pass) => hold_for(pass, ops, &mut streamed, &mut keep),
                 Op::Loop(l) => hold_for_loop(l, ops, &mut streamed, &mut keep),
@@ -599,9 +616,17 @@ fn look_is_bounded(pass: &KernelPass, streamed: &BTreeSet<ResourceId>) -> bool {
 /// The round in which each operation can run first.
 fn levels(list: &[Op], streamed: &BTreeSet<ResourceId>) -> Vec<u32> {
     let mut ready: BTreeMap<ResourceId, u32> = BTreeMap::new();
+    let mut read: BTreeMap<ResourceId, u32> = BTreeMap::new();
     let mut levels = Vec::with_capacity(list.len());
     for op in list {
-        let level = op.sources().iter().filter_map(|id| ready.get(id)).copied().max().unwrap_or(0);
+        // What it overwrites was read before.
+        let (sources, own) = (op.sources(), op.takes_over());
+        let times = sources.iter().filter_map(|id| ready.get(id)).chain(own.iter().filter_map(|id| read.get(id)));
+        let level = times.copied().max().unwrap_or(0);
+        for id in sources {
+            let known = read.entry(id).or_default();
+            *known = level.max(*known);
+        }
         let by_tiles = op.sources().iter().chain(&op.results()).any(|id| streamed.contains(id));
         for id in op.results() {
             let whole = !streamed.contains(&id);

@@ -290,7 +290,7 @@ impl Maker {
         let image = self.image(size);
         let reach = if self.numbers.one_in(2) { Reach::Point } else { self.around() };
         let reads = vec![self.read(image, reach)];
-        let writes = (0..1 + self.numbers.below(3)).map(|_| (self.image_shape(size), Access::Store, None)).collect();
+        let writes = (0..=self.numbers.below(3)).map(|_| (self.image_shape(size), Access::Store, None)).collect();
         self.pass(Entry::Each, reads, writes, Grid::Cover);
     }
 
