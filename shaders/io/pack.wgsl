@@ -37,10 +37,8 @@ fn bits(v: f32) -> u32 {
     if FLOATING {
         return float_to_half(v);
     }
-    if is_nan(v) {
-        return 0u;
-    }
-    return u32(clamp(v, 0.0, 1.0) * select(65535.0, 255.0, BYTES == 1) + 0.5);
+    let code = u32(clamp(v, 0.0, 1.0) * select(65535.0, 255.0, BYTES == 1) + 0.5);
+    return select(code, 0u, is_nan(v));
 }
 
 /// The sample of channel c: the last one is alpha when there is one.
@@ -54,11 +52,13 @@ fn component(v: vec4f, c: i32) -> f32 {
 fn each(group: i32) {
     let pixels = 4 / BYTES;
     let count = held_c0().x * held_c0().y;
+    // Known when compiling unless the picture is cut into tiles.
+    let whole = count % pixels == 0;
     if PLANAR {
         var words = array<u32, 4>();
         for (var k = 0; k < pixels; k++) {
             let pixel = group * pixels + k;
-            if pixel < count {
+            if whole || pixel < count {
                 let v = encode(pixel);
                 for (var c = 0; c < CHANNELS; c++) {
                     words[c] |= bits(component(v, c)) << u32(k * BYTES * 8);
@@ -73,7 +73,7 @@ fn each(group: i32) {
         for (var k = 0; k < pixels; k++) {
             let pixel = group * pixels + k;
             var v = vec4f();
-            if pixel < count {
+            if whole || pixel < count {
                 v = encode(pixel);
             }
             for (var c = 0; c < CHANNELS; c++) {
