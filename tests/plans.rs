@@ -48,16 +48,24 @@ fn node(i: usize, (kind, a, b): Choice) -> String {
     }
 }
 
-/// A graph of these nodes; the last three are outputs, and the mean of the last is measured.
+/// A graph of these nodes; the last three are outputs, and the mean of the last is measured. Where the nodes do not begin with
+/// the first, inputs and outputs stand in another order too.
 fn text(choices: &[Choice], order: &[usize]) -> String {
     let nodes: Vec<String> = choices.iter().enumerate().map(|(i, c)| format!("\"n{i}\": {},\n", node(i, *c))).collect();
     let ordered: String = order.iter().filter_map(|i| nodes.get(*i)).cloned().collect();
     let n = choices.len();
-    let outputs: String = (n.saturating_sub(3)..n).map(|i| format!("\"o{i}\": \"n{i}\", ")).collect();
+    let mut outputs: Vec<String> = (n.saturating_sub(3)..n).map(|i| format!("\"o{i}\": \"n{i}\"")).collect();
+    let mut inputs = [r#""in": Image"#, r#""other": Image"#];
+    if order.first() != Some(&0) {
+        inputs.reverse();
+        outputs.reverse();
+    }
     format!(
-        r#"Graph(version: 1, inputs: {{"in": Image, "other": Image}}, nodes: {{{ordered} "mean": PyramidAverage(image: "n{}")}},
-        outputs: {{{outputs} "mean": "mean"}})"#,
-        n - 1
+        r#"Graph(version: 1, inputs: {{{}}}, nodes: {{{ordered} "mean": PyramidAverage(image: "n{}")}},
+        outputs: {{{}, "mean": "mean"}})"#,
+        inputs.join(", "),
+        n - 1,
+        outputs.join(", ")
     )
 }
 
@@ -79,7 +87,7 @@ fn config(cases: u32) -> Config {
 }
 
 proptest! {
-    #![proptest_config(config(150))]
+    #![proptest_config(config(400))]
 
     #[test]
     fn the_order_of_a_file_decides_nothing_and_fusing_only_saves(

@@ -159,7 +159,10 @@ impl Resolver<'_> {
         let mut env = Env::new();
         env.set("frame", self.request.frame);
         env.set("time", self.request.time);
-        for input in &document.inputs {
+        // Their place in the file decides nothing.
+        let mut in_order: Vec<_> = document.inputs.iter().collect();
+        in_order.sort_by(|a, b| a.name.value.cmp(&b.name.value));
+        for input in in_order {
             let ty = self.request.inputs.get(&input.name.value).copied().unwrap_or_else(|| self.assumed(input.kind));
             if ty.kind() != input.kind {
                 self.diagnostics.push(Diagnostic::error(
