@@ -127,13 +127,15 @@ fn tiles_hold_what_a_graph_means() {
 #[test]
 #[ignore = "measures, and can only pass"]
 fn planning_500_passes() {
-    let recipe: Vec<Choice> = (0..500_u64).map(|i| ((i * 7 % 21) as u8, i.wrapping_mul(0x9e37_79b9_7f4a_7c15))).collect();
+    let recipe: Vec<Choice> =
+        (0..500_u64).map(|i| (if i % 9 == 8 { 24 } else { (i * 7 % 20) as u8 }, i.wrapping_mul(0x9e37_79b9_7f4a_7c15))).collect();
     let graph = graphs::graph(&recipe);
     let mut times: Vec<f64> = (0..7)
         .map(|_| {
             let (graph, started) = (graph.clone(), std::time::Instant::now());
-            let plan = crate::plan("random", graph, &Limits::default(), &Options::default()).unwrap();
-            assert!(plan.peak_bytes < plan.naive_bytes);
+            let ops = prune(Ops::new(graph));
+            let schedule = schedule(fuse(ops, &Limits::default(), Thrift::Bytes).0);
+            allocate::allocate("random", schedule, &Limits::default(), &Options::default()).unwrap_or_else(|e| panic!("{e}"));
             started.elapsed().as_secs_f64() * 1e3
         })
         .collect();
