@@ -29,6 +29,7 @@ use pipe_graph::pass::{Limits, PassGraph};
 use lower::{Rim, lower};
 
 use fuse::Thrift;
+use kernel_pass::Ops;
 use schedule::Schedule;
 
 pub use error::PlanError;
@@ -83,7 +84,7 @@ impl std::str::FromStr for Phase {
 
 /// What there is after a phase, for people.
 pub fn after(graph: PassGraph, phase: Phase, fuse: bool, limits: &Limits) -> String {
-    let ops = kernel_pass::Ops::new(graph);
+    let ops = Ops::new(graph);
     if phase == Phase::Lower {
         return print::ops(&ops);
     }
@@ -96,15 +97,27 @@ pub fn after(graph: PassGraph, phase: Phase, fuse: bool, limits: &Limits) -> Str
         let lines: String = decisions.iter().map(|d| format!("{d}\n")).collect();
         return format!("{}\n{lines}", print::ops(&ops));
     }
-    let Schedule { ops, portions } = schedule::schedule(narrow::narrow(ops));
+    let Schedule { ops, portions } = schedule::schedule(ops);
     let list = portions.into_iter().flat_map(|p| p.ops().to_vec()).collect();
-    print::ops(&kernel_pass::Ops { ops: list, ..ops })
+    print::ops(&Ops { ops: list, ..ops })
 }
 
 /// Plans a pass graph for a device, over whole images.
 pub fn plan(name: &str, graph: PassGraph, limits: &Limits, options: &Options) -> Result<Plan, PlanError> {
-    let ops = prune::prune(kernel_pass::Ops::new(graph));
-    allocate::allocate(name, ordered(ops, limits, options, Thrift::Bytes), limits, options)
+    whole(name, prune::prune(Ops::new(graph)), limits, options, Thrift::Bytes)
+}
+
+/// The plan over whole images. Halves are stored as halves where that takes no more memory in the end: images of different
+/// precision cannot share a slot.
+fn whole(name: &str, ops: Ops, limits: &Limits, options: &Options, thrift: Thrift) -> Result<Plan, PlanError> {
+    let ops = fused(ops, limits, options, thrift);
+    let plan = |ops| allocate::allocate(name, schedule::schedule(ops), limits, options);
+    let narrowed = narrow::narrow(&ops).map(plan);
+    match (plan(ops), narrowed) {
+        (Ok(wide), Some(Ok(narrow))) if wide.peak_bytes < narrow.peak_bytes => Ok(wide),
+        (_, Some(Ok(narrow))) => Ok(narrow),
+        (wide, _) => wide,
+    }
 }
 
 /// Plans a graph for a device: over whole images where they fit, otherwise with more values computed anew instead of
@@ -113,29 +126,29 @@ pub fn plan_graph(graph: &Graph, rim: &Rim, limits: &Limits, options: &Options, 
     let pruned = |limits: &Limits| {
         let mut passes = lower(graph, rim, limits)?;
         passes.fetches.retain(|f| wanted(&f.name));
-        Ok(prune::prune(kernel_pass::Ops::new(passes)))
+        Ok::<Ops, PlanError>(prune::prune(Ops::new(passes)))
     };
-    let whole = |limits: &Limits, thrift| {
-        let schedule = ordered(pruned(limits)?, limits, options, thrift);
-        allocate::allocate(&graph.name, schedule, limits, options)
+    let in_parts = Limits { tiled: true, ..*limits };
+    let streamable = || {
+        let ops = fused(pruned(&in_parts)?, &in_parts, options, Thrift::Memory);
+        Ok::<Schedule, PlanError>(schedule::schedule(narrow::narrow(&ops).unwrap_or(ops)))
     };
     if let Some(step) = options.tile {
-        let limits = Limits { tiled: true, ..*limits };
-        return tile::plan_in(&graph.name, ordered(pruned(&limits)?, &limits, options, Thrift::Memory), &limits, options, step);
+        return tile::plan_in(&graph.name, streamable()?, &in_parts, options, step);
     }
-    let refused = match whole(limits, Thrift::Bytes) {
+    let refused = match whole(&graph.name, pruned(limits)?, limits, options, Thrift::Bytes) {
         Err(error) if error.is_about_size() => error,
         result => return result,
     };
-    if let (true, Ok(plan)) = (options.fuse, whole(limits, Thrift::Memory)) {
+    if options.fuse
+        && let Ok(plan) = whole(&graph.name, pruned(limits)?, limits, options, Thrift::Memory)
+    {
         return Ok(plan);
     }
-    let limits = Limits { tiled: true, ..*limits };
-    let schedule = ordered(pruned(&limits)?, &limits, options, Thrift::Memory);
-    tile::plan(&graph.name, &schedule, &limits, options).map_err(|why| PlanError::NoTiles { whole: Box::new(refused), why })
+    let plan = tile::plan(&graph.name, &streamable()?, &in_parts, options);
+    plan.map_err(|why| PlanError::NoTiles { whole: Box::new(refused), why })
 }
 
-fn ordered(ops: kernel_pass::Ops, limits: &Limits, options: &Options, thrift: Thrift) -> Schedule {
-    let ops = if options.fuse { fuse::fuse(ops, limits, thrift).0 } else { ops };
-    schedule::schedule(narrow::narrow(ops))
+fn fused(ops: Ops, limits: &Limits, options: &Options, thrift: Thrift) -> Ops {
+    if options.fuse { fuse::fuse(ops, limits, thrift).0 } else { ops }
 }

@@ -10,8 +10,8 @@ use pipe_graph::types::Precision;
 
 use crate::kernel_pass::{KernelPass, Op, Ops, Source};
 
-/// Chooses the storage of images between passes.
-pub(crate) fn narrow(mut ops: Ops) -> Ops {
+/// The same with images of halves stored as halves; `None` where there are none.
+pub(crate) fn narrow(ops: &Ops) -> Option<Ops> {
     let mut fixed: BTreeSet<ResourceId> = ops.wanted().collect();
     for op in &ops.ops {
         if let Op::Loop(l) = op {
@@ -33,12 +33,17 @@ pub(crate) fn narrow(mut ops: Ops) -> Ops {
             halves.retain(|id| pass.writes.iter().all(|w| w.in_place_of != Some(*id)));
         }
     }
+    let wide = |id: &ResourceId| matches!(ops.shape(*id), Shape::Image(t) if t.precision == Precision::F32);
+    if !halves.iter().any(wide) {
+        return None;
+    }
+    let mut ops = ops.clone();
     for id in halves {
         if let Shape::Image(t) = &mut ops.resources[id.index()].shape {
             t.precision = Precision::F16;
         }
     }
-    ops
+    Some(ops)
 }
 
 fn makes_halves(pass: &KernelPass, stage: usize, halves: &BTreeSet<ResourceId>) -> bool {
