@@ -205,6 +205,11 @@ impl Plan {
         for (id, name) in resources.iter().enumerate() {
             let _ = writeln!(out, "  r{id} [shape=ellipse, label={name:?}];");
         }
+        for (t, tiling) in self.tilings().enumerate() {
+            let inside = |line: &Line<'_>| line.around.iter().any(|a| matches!(a, Around::Tiles(other) if std::ptr::eq(*other, tiling)));
+            let passes: String = self.lines().iter().enumerate().filter(|(_, l)| inside(l)).map(|(i, _)| format!(" p{i};")).collect();
+            let _ = writeln!(out, "  subgraph cluster{t} {{ label={:?};{passes} }}", Around::Tiles(tiling).times());
+        }
         out.push_str("}\n");
         out
     }
