@@ -1,7 +1,7 @@
 //! Slots → textures and buffers, kept for reuse across plans and frames.
 //!
-//! A slot is reused for one that holds what it needs or that equals it, never for a smaller one: plans of one graph at one size are what comes
-//! again and again (frames, `watch`), and equal slots make that exact. Everything is checked against the device and
+//! A slot is reused for one that holds what it needs or that equals it, never for a smaller one: plans of one graph at one
+//! size are what comes again and again (frames, `watch`), and equal slots make that exact. Everything is checked against the device and
 //! the budget before the first byte is allocated, so a plan that cannot run fails before it slowed anything down.
 
 use pipe_plan::plan::{Launch, Plan, Slot, SlotId, Storage};

@@ -111,7 +111,7 @@ pub(crate) fn allocate(name: &str, schedule: Schedule, limits: &Limits, options:
     }
     let Player { composer, held, .. } = player;
     let naive_bytes = held.iter().map(|h| h.storage.bytes()).sum();
-    let share = !options.keep || naive_bytes > options.budget.or(limits.budget).unwrap_or(ASSUMED_BUDGET) / 2;
+    let share = !options.keep || naive_bytes > options.budget_on(limits).unwrap_or(ASSUMED_BUDGET) / 2;
     let (slot_of, mut slots) = colour(&held, share);
     let at = |id: ResourceId| slot_of[names[&id].0];
 
@@ -139,7 +139,7 @@ pub(crate) fn allocate(name: &str, schedule: Schedule, limits: &Limits, options:
     });
     let histories = histories.collect();
 
-    let mut writer = Writer { ops: &ops, slot_of: &slot_of, uniforms: Vec::new(), bytes_moved: 0, placed: Vec::new() };
+    let mut writer = Writer { ops: &ops, slot_of: &slot_of, uniforms: Vec::new(), bytes_moved: 0, launched: None };
     let steps = writer.steps(drafts);
     let peak_bytes = slots.iter().map(|s| s.storage.bytes()).sum();
     check(&ops, &held, &slots, limits, options)?;
@@ -167,11 +167,8 @@ fn given(ops: &Ops, portions: &[Portion]) -> Vec<ResourceId> {
     given.dedup();
     given.retain(|id| !matches!(ops.resources[id.index()].origin, Origin::Pass | Origin::State));
     // What tiles need is brought for each.
-    for portion in portions {
-        if let Portion::Tiles(tiling) = portion {
-            given.retain(|id| !tiling.uploads.iter().any(|u| u.resource == *id));
-        }
-    }
+    let brought: BTreeSet<ResourceId> = portions.iter().filter_map(Portion::tiling).flat_map(|t| &t.uploads).map(|u| u.resource).collect();
+    given.retain(|id| !brought.contains(id));
     given
 }
 
@@ -232,7 +229,7 @@ fn check(ops: &Ops, held: &[Held], slots: &[Slot], limits: &Limits, options: &Op
         }
     }
     let needed: u64 = slots.iter().map(|s| s.storage.bytes()).sum();
-    match options.budget.into_iter().chain(limits.budget).min() {
+    match options.budget_on(limits) {
         Some(budget) if needed > budget => {
             let largest = held.iter().max_by_key(|value| value.storage.bytes());
             let (name, bytes) = largest.map(|v| (ops.resources[v.resource.index()].name.clone(), v.storage.bytes())).unwrap_or_default();
@@ -635,8 +632,8 @@ struct Writer<'a> {
     slot_of: &'a [SlotId],
     uniforms: Vec<u8>,
     bytes_moved: u64,
-    /// The launches written last, for the tiles that they belong to.
-    placed: Vec<Launched>,
+    /// The launches of the body that is being written, where that is one of tiles.
+    launched: Option<Vec<Launched>>,
 }
 
 /// A launch of a tile's body, with what differs from tile to tile.
@@ -656,8 +653,8 @@ impl Launched {
             let [x, y] = match place.what {
                 Placed::GridFirst => origin(&grid),
                 Placed::GridEnd => [grid.x.end as i32, grid.y.end as i32],
-                Placed::First(id) => origin(&windows.window(id, tile).unwrap_or_else(|| tile.clone())),
-                Placed::Size(id) => windows.window(id, tile).unwrap_or_else(|| tile.clone()).size().map(|n| n as i32),
+                Placed::First(id) => origin(&windows.part(id, tile)),
+                Placed::Size(id) => windows.part(id, tile).size().map(|n| n as i32),
             };
             let at = self.uniform_offset + place.offset as u32;
             uniforms.extend([(at, x), (at + 4, y)]);
@@ -693,8 +690,7 @@ impl Writer<'_> {
         let writes: Vec<ResourceId> = pass.writes.iter().map(|w| w.resource).collect();
         let bytes = reads.iter().chain(&writes).map(|id| self.ops.shape(*id).bytes()).sum();
         self.bytes_moved += bytes;
-        self.placed.push(Launched { pass: pass.clone(), places: composed.places, cover: composed.cover, uniform_offset });
-        Run {
+        let run = Run {
             name: pass.name.clone(),
             nodes: pass.nodes.iter().map(|n| self.ops.nodes[n.0 as usize].clone()).collect(),
             kernel: composed.kernel,
@@ -705,20 +701,24 @@ impl Writer<'_> {
             bytes,
             reads: reads.iter().map(name).collect(),
             writes: writes.iter().map(name).collect(),
+        };
+        if let Some(launched) = &mut self.launched {
+            launched.push(Launched { pass, places: composed.places, cover: composed.cover, uniform_offset });
         }
+        run
     }
 
     fn tiles(&mut self, t: TilesDraft) -> Tiling {
         let before = self.bytes_moved;
-        self.placed.clear();
+        self.launched = Some(Vec::new());
         let body = self.steps(t.body);
-        let launched = std::mem::take(&mut self.placed);
+        let launched = self.launched.take().unwrap_or_default();
         let slot = |v: &ValueId| self.slot_of[v.0];
         let crossing = |(brought, value): &(Brought, ValueId), tile: &Rect| {
             let Shape::Pixels { pixel, .. } = self.ops.shape(brought.resource) else {
                 unreachable!("only pixels cross the rim tile by tile")
             };
-            let rect = t.windows.window(brought.resource, tile).unwrap_or_else(|| tile.clone());
+            let rect = t.windows.part(brought.resource, tile);
             let Brought { name, plane, .. } = brought.clone();
             Crossing { name, plane, pixel, size: t.windows.size, rect, slot: slot(value) }
         };

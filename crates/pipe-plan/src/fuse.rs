@@ -100,7 +100,7 @@ fn share_equal(list: Vec<Op>, outside: &BTreeSet<ResourceId>, log: &mut Vec<Stri
     let overwritten: BTreeSet<ResourceId> = list.iter().flat_map(Op::takes_over).collect();
     let lasts = |pass: &KernelPass| pass.writes.iter().all(|w| w.in_place_of.is_none() && !overwritten.contains(&w.resource));
     for mut op in list {
-        rename(&mut op, &renamed);
+        op.rename(&renamed);
         if let Op::Pass(pass) = &op {
             let free = lasts(pass) && pass.writes.iter().all(|w| !outside.contains(&w.resource));
             let twin = kept.iter().find_map(|other| match other {
@@ -123,34 +123,6 @@ fn share_equal(list: Vec<Op>, outside: &BTreeSet<ResourceId>, log: &mut Vec<Stri
 fn same_work(a: &KernelPass, b: &KernelPass) -> bool {
     let ports = |p: &KernelPass| -> Vec<(String, Access)> { p.writes.iter().map(|w| (w.port.clone(), w.access)).collect() };
     a.stages == b.stages && a.reads == b.reads && a.grid == b.grid && ports(a) == ports(b)
-}
-
-fn rename(op: &mut Op, names: &BTreeMap<ResourceId, ResourceId>) {
-    let to = |id: &mut ResourceId| {
-        if let Some(new) = names.get(id) {
-            *id = *new;
-        }
-    };
-    match op {
-        Op::Pass(p) => {
-            p.reads.iter_mut().for_each(to);
-            p.writes.iter_mut().filter_map(|w| w.in_place_of.as_mut()).for_each(to);
-            for stage in &mut p.stages {
-                for value in stage.params.values_mut() {
-                    if let pipe_graph::pass::Value::Driven(id) = value {
-                        to(id);
-                    }
-                }
-            }
-        }
-        Op::Loop(l) => {
-            for s in &mut l.states {
-                to(&mut s.init);
-                to(&mut s.next);
-            }
-            l.body.iter_mut().for_each(|op| rename(op, names));
-        }
-    }
 }
 
 struct Fusion<'a> {

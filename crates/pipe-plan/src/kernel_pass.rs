@@ -4,6 +4,7 @@
 //! stage for its value at that place; so fusing two passes is nothing but putting both stages into one pass and
 //! turning a load into such a question. A pass as a node declared it has one stage.
 
+use std::collections::BTreeMap;
 use std::ops::Range;
 
 use indexmap::IndexMap;
@@ -262,6 +263,26 @@ impl Op {
         meet(&self.sources(), &earlier.results()) || meet(&self.takes_over(), &earlier.sources())
     }
 
+    /// Gives resources other names, wherever it names them.
+    pub(crate) fn rename(&mut self, names: &BTreeMap<ResourceId, ResourceId>) {
+        let to = |id: &mut ResourceId| *id = names.get(id).copied().unwrap_or(*id);
+        match self {
+            Self::Pass(pass) => {
+                pass.reads.iter_mut().for_each(to);
+                pass.writes.iter_mut().flat_map(|w| [Some(&mut w.resource), w.in_place_of.as_mut()]).flatten().for_each(to);
+                for value in pass.stages.iter_mut().flat_map(|s| s.params.values_mut()) {
+                    if let Value::Driven(id) = value {
+                        to(id);
+                    }
+                }
+            }
+            Self::Loop(l) => {
+                l.states.iter_mut().flat_map(|s| [&mut s.init, &mut s.carried, &mut s.next, &mut s.result]).for_each(to);
+                l.body.iter_mut().for_each(|op| op.rename(names));
+            }
+        }
+    }
+
     /// Resources that later operations may read.
     pub(crate) fn results(&self) -> Vec<ResourceId> {
         match self {
@@ -308,6 +329,13 @@ impl Portion {
         match self {
             Self::Whole(ops) => ops,
             Self::Tiles(tiling) => &tiling.body,
+        }
+    }
+
+    pub(crate) const fn tiling(&self) -> Option<&TilingOp> {
+        match self {
+            Self::Whole(_) => None,
+            Self::Tiles(tiling) => Some(tiling),
         }
     }
 }

@@ -49,6 +49,13 @@ pub struct Options {
     pub keep: bool,
 }
 
+impl Options {
+    /// Bytes that may be alive at once on a device: the lesser of what the user and the device allow.
+    fn budget_on(&self, limits: &Limits) -> Option<u64> {
+        self.budget.into_iter().chain(limits.budget).min()
+    }
+}
+
 impl Default for Options {
     fn default() -> Self {
         Self { fuse: true, budget: None, tile: None, keep: false }

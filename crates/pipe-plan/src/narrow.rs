@@ -14,6 +14,8 @@ use crate::kernel_pass::{KernelPass, Op, Ops, Source};
 pub(crate) fn narrow(ops: &Ops) -> Option<Ops> {
     let mut fixed: BTreeSet<ResourceId> = ops.wanted().collect();
     for op in &ops.ops {
+        // A write in the place of another has that one's storage.
+        fixed.extend(op.takes_over());
         if let Op::Loop(l) = op {
             fixed.extend(l.states.iter().flat_map(|s| [s.init, s.carried, s.next, s.result]));
         }
@@ -25,12 +27,6 @@ pub(crate) fn narrow(ops: &Ops) -> Option<Ops> {
             if matches!(ops.shape(write.resource), Shape::Image(_)) && makes_halves(pass, write.stage, &halves) {
                 halves.insert(write.resource);
             }
-        }
-    }
-    // A write in the place of another has that one's storage.
-    for op in &ops.ops {
-        if let Op::Pass(pass) = op {
-            halves.retain(|id| pass.writes.iter().all(|w| w.in_place_of != Some(*id)));
         }
     }
     let wide = |id: &ResourceId| matches!(ops.shape(*id), Shape::Image(t) if t.precision == Precision::F32);

@@ -78,6 +78,11 @@ impl Windows {
         self.halos.get(&id).map(|halo| self.widened(tile, *halo))
     }
 
+    /// The part of a resource that belongs to a tile: its window, or the tile itself of what is held whole.
+    pub(crate) fn part(&self, id: ResourceId, tile: &Rect) -> Rect {
+        self.window(id, tile).unwrap_or_else(|| tile.clone())
+    }
+
     /// The size that fits the window of every tile.
     pub(crate) fn largest(&self, halo: Halo) -> [u32; 2] {
         let one = |i: usize| self.step[i].saturating_add(halo.before[i]).saturating_add(halo.after[i]).min(self.size[i]);

@@ -53,7 +53,7 @@ pub(super) fn play(plan: &Plan, schedule: &Schedule, ending: Ending) -> Result<S
         Machine { plan, ops: &schedule.ops, slots: garbage, passes, tiling: None, later_tile: false, ending, checks: Checks::new() };
     machine.begin();
     let mut taken = Taken::new();
-    let mut tilings = schedule.portions.iter().filter_map(|p| if let Portion::Tiles(t) = p { Some(t) } else { None });
+    let mut tilings = schedule.portions.iter().filter_map(Portion::tiling);
     for step in &plan.steps {
         match step {
             Step::Tiles(steps) => machine.tiles(steps, tilings.next().ok_or("a tiling too many")?, &mut taken)?,

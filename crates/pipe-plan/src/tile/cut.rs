@@ -81,7 +81,7 @@ impl Streams {
             names.insert(*id, new);
             own.halos.insert(new, *halo);
         }
-        list.iter_mut().for_each(|op| rename(op, &names));
+        list.iter_mut().for_each(|op| op.rename(&names));
         let mut uploads = Vec::new();
         for (old, new) in &names {
             if let Origin::External { name, ranges } = &ops.resources[old.index()].origin {
@@ -156,26 +156,5 @@ impl Streams {
             *known = known.union(wide);
         }
         wide
-    }
-}
-
-/// Gives what an operation names other names.
-fn rename(op: &mut Op, names: &BTreeMap<ResourceId, ResourceId>) {
-    let to = |id: &mut ResourceId| {
-        if let Some(new) = names.get(id) {
-            *id = *new;
-        }
-    };
-    match op {
-        Op::Pass(pass) => {
-            pass.reads.iter_mut().for_each(to);
-            pass.writes.iter_mut().for_each(|w| to(&mut w.resource));
-        }
-        Op::Loop(l) => {
-            for s in &mut l.states {
-                [&mut s.init, &mut s.carried, &mut s.next, &mut s.result].into_iter().for_each(to);
-            }
-            l.body.iter_mut().for_each(|op| rename(op, names));
-        }
     }
 }

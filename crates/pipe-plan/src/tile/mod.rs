@@ -100,7 +100,7 @@ impl Streams {
     /// What the smallest tiles need most of.
     fn widest(&self, ops: &Ops) -> String {
         let schedule = self.cut(ops.clone(), [LEAST; 2]);
-        let tilings = schedule.portions.iter().filter_map(|p| if let Portion::Tiles(t) = p { Some(t) } else { None });
+        let tilings = schedule.portions.iter().filter_map(Portion::tiling);
         let held = tilings.flat_map(|t| t.windows.halos.keys()).map(|id| &schedule.ops.resources[id.index()]);
         let widest = held.max_by_key(|r| r.shape.bytes());
         widest.map_or_else(String::new, |r| {
@@ -110,7 +110,7 @@ impl Streams {
 
     /// Sizes of tiles that may fit, halved again and again from the whole image; how much they overlap.
     fn candidates(&self, ops: &Ops, limits: &Limits, options: &Options) -> Vec<Candidate> {
-        let budget = options.budget.into_iter().chain(limits.budget).min().unwrap_or(u64::MAX);
+        let budget = options.budget_on(limits).unwrap_or(u64::MAX);
         let sizes = self.streamed.iter().filter_map(|id| ops.shape(*id).plane());
         let size = sizes.fold([1, 1], |a, b| [a[0].max(b[0]), a[1].max(b[1])]);
         let halved = |n: u32| {
@@ -121,8 +121,7 @@ impl Streams {
         for w in halved(size[0]) {
             for h in halved(size[1]) {
                 let schedule = self.cut(ops.clone(), [w, h]);
-                let tilings: Vec<&TilingOp> =
-                    schedule.portions.iter().filter_map(|p| if let Portion::Tiles(t) = p { Some(t) } else { None }).collect();
+                let tilings: Vec<&TilingOp> = schedule.portions.iter().filter_map(Portion::tiling).collect();
                 let held = || tilings.iter().flat_map(|t| t.windows.halos.keys());
                 let fits = held().all(|id| match schedule.ops.shape(*id) {
                     Shape::Image(t) => t.size.iter().all(|n| *n <= limits.max_image) && schedule.ops.shape(*id).bytes() <= budget,
