@@ -1,6 +1,5 @@
-// Smallest and largest finite value, and how many values are NaN or infinite: 16 runs of as many floats as there are
-// partials. Constants: LEFT (partials that a group leaves: 1, or one a lane), VIEW (0 channels, 1 luminance, 2 colour
-// and luminance).
+// Smallest and largest finite value, and how many values are NaN or infinite. Constants: VIEW (0 channels, 1 luminance,
+// 2 colour and luminance). See partials.wgsl, which stands behind this file.
 
 import package::lib::wide::viewed;
 
@@ -28,36 +27,13 @@ fn take(xy: vec2i, pixel: vec4f) {
     infs += select(vec4f(), vec4f(1.0), magnitude == vec4u(0x7f800000u));
 }
 
-fn end() {
-    for (var half = LANES / 2; half >= LEFT; half /= 2) {
-        if lane() >= half && lane() < 2 * half {
-            let at = 4 * (lane() - half);
-            scratch_store(at, low);
-            scratch_store(at + 1, high);
-            scratch_store(at + 2, nans);
-            scratch_store(at + 3, infs);
-        }
-        workgroupBarrier();
-        if lane() < half {
-            let at = 4 * lane();
-            low = min(low, scratch_load(at));
-            high = max(high, scratch_load(at + 1));
-            nans += scratch_load(at + 2);
-            infs += scratch_load(at + 3);
-        }
-        workgroupBarrier();
-    }
-    if lane() < LEFT {
-        leave(group() * LEFT + lane());
-    }
+fn part(i: i32) -> vec4f {
+    return array(low, high, nans, infs)[i];
 }
 
-fn leave(index: i32) {
-    let n = size_partials() / 16;
-    for (var c = 0; c < 4; c++) {
-        store_partials(c * n + index, low[c]);
-        store_partials((4 + c) * n + index, high[c]);
-        store_partials((8 + c) * n + index, nans[c]);
-        store_partials((12 + c) * n + index, infs[c]);
-    }
+fn absorb(at: i32) {
+    low = min(low, scratch_load(at));
+    high = max(high, scratch_load(at + 1));
+    nans += scratch_load(at + 2);
+    infs += scratch_load(at + 3);
 }

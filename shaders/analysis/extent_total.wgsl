@@ -9,23 +9,18 @@ var<workgroup> high: array<vec4f, LANES>;
 var<workgroup> nans: array<vec4f, LANES>;
 var<workgroup> infs: array<vec4f, LANES>;
 
-fn run_of(part: i32, index: i32, n: i32) -> vec4f {
-    let first = part * 4 * n + index;
-    return vec4f(load_partials(first), load_partials(first + n), load_partials(first + 2 * n), load_partials(first + 3 * n));
-}
-
 @compute @workgroup_size(256, 1, 1)
 fn main(@builtin(local_invocation_index) lane: u32) {
-    let n = size_partials() / 16;
+    let n = count_of_partials();
     var a = vec4f(LARGEST);
     var b = vec4f(-LARGEST);
     var nan = vec4f();
     var inf = vec4f();
     for (var i = i32(lane); i < n; i += i32(LANES)) {
-        a = min(a, run_of(0, i, n));
-        b = max(b, run_of(1, i, n));
-        nan += run_of(2, i, n);
-        inf += run_of(3, i, n);
+        a = min(a, run_of(0, i));
+        b = max(b, run_of(1, i));
+        nan += run_of(2, i);
+        inf += run_of(3, i);
     }
     low[lane] = a;
     high[lane] = b;

@@ -9,11 +9,6 @@ var<workgroup> sums: array<vec4f, LANES>;
 var<workgroup> errors: array<vec4f, LANES>;
 var<workgroup> counts: array<vec4f, LANES>;
 
-fn run_of(part: i32, index: i32, n: i32) -> vec4f {
-    let first = part * 4 * n + index;
-    return vec4f(load_partials(first), load_partials(first + n), load_partials(first + 2 * n), load_partials(first + 3 * n));
-}
-
 fn finish(total: vec4f, count: vec4f) -> vec4f {
     let mean = select(vec4f(), total / max(count, vec4f(1.0)), count > vec4f(0.0));
     if FINISH == 1 {
@@ -27,15 +22,15 @@ fn finish(total: vec4f, count: vec4f) -> vec4f {
 
 @compute @workgroup_size(256, 1, 1)
 fn main(@builtin(local_invocation_index) lane: u32) {
-    let n = size_partials() / 12;
+    let n = count_of_partials();
     var sum = vec4f();
     var error = vec4f();
     var count = vec4f();
     for (var i = i32(lane); i < n; i += i32(LANES)) {
-        let term = run_of(0, i, n);
-        error += sum_error(sum, term) + run_of(1, i, n);
+        let term = run_of(0, i);
+        error += sum_error(sum, term) + run_of(1, i);
         sum += term;
-        count += run_of(2, i, n);
+        count += run_of(2, i);
     }
     sums[lane] = sum;
     errors[lane] = error;

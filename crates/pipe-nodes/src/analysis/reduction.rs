@@ -65,9 +65,9 @@ pub(crate) fn finite(cx: &mut Lowering<'_>, suffix: &str, image: ResourceId) -> 
 /// The standard deviation √(Σ (v − mean)² / n), in one walk.
 pub(crate) fn deviation(cx: &mut Lowering<'_>, suffix: &str, image: ResourceId, view: View) -> ResourceId {
     let partials = Partials { suffix, image, parts: 4 };
-    let partials = partials.walk(cx, shader!("analysis/deviation"), |pass| pass.constant("VIEW", view as i32));
+    let table = partials.walk(cx, &shader!("analysis/deviation"), |pass| pass.constant("VIEW", view as i32));
     let out = cx.intermediate(suffix, Shape::Scalar);
-    total(cx, suffix, shader!("analysis/deviation_total"), partials, &[("out", out)], |pass| pass);
+    partials.total(cx, &shader!("analysis/deviation_total"), table, &[("out", out)], |pass| pass);
     out
 }
 
@@ -83,11 +83,11 @@ struct Sums {
 impl Sums {
     fn lower(&self, cx: &mut Lowering<'_>, suffix: &str, image: ResourceId, view: View) -> ResourceId {
         let partials = Partials { suffix, image, parts: 3 };
-        let partials = partials.walk(cx, shader!("analysis/sum"), |pass| {
+        let table = partials.walk(cx, &shader!("analysis/sum"), |pass| {
             pass.constant("VIEW", view as i32).constant("MEASURE", self.measure).param("epsilon", self.epsilon)
         });
         let out = cx.intermediate(suffix, Shape::Scalar);
-        total(cx, suffix, shader!("analysis/sum_total"), partials, &[("out", out)], |pass| pass.constant("FINISH", self.finish));
+        partials.total(cx, &shader!("analysis/sum_total"), table, &[("out", out)], |pass| pass.constant("FINISH", self.finish));
         out
     }
 }
@@ -107,11 +107,11 @@ pub(crate) struct Extent {
 /// Smallest and largest finite value, and how many values are none.
 pub(crate) fn extent(cx: &mut Lowering<'_>, suffix: &str, image: ResourceId, view: View) -> Extent {
     let partials = Partials { suffix, image, parts: 4 };
-    let partials = partials.walk(cx, shader!("analysis/extent"), |pass| pass.constant("VIEW", view as i32));
+    let table = partials.walk(cx, &shader!("analysis/extent"), |pass| pass.constant("VIEW", view as i32));
     let mut part = |name: &str| cx.intermediate(&format!("{suffix}.{name}"), Shape::Scalar);
     let extent = Extent { min: part("min"), max: part("max"), nan: part("nan"), inf: part("inf") };
     let outs = [("smallest", extent.min), ("largest", extent.max), ("nan", extent.nan), ("inf", extent.inf)];
-    total(cx, suffix, shader!("analysis/extent_total"), partials, &outs, |pass| pass);
+    partials.total(cx, &shader!("analysis/extent_total"), table, &outs, |pass| pass);
     extent
 }
 
@@ -127,7 +127,7 @@ impl Partials<'_> {
     fn walk<'a>(
         &self,
         cx: &mut Lowering<'a>,
-        shader: Shader,
+        shader: &Shader,
         with: impl for<'b> FnOnce(PassBuilder<'b, 'a>) -> PassBuilder<'b, 'a>,
     ) -> ResourceId {
         let size = cx.image_of(self.image).size;
@@ -141,29 +141,35 @@ impl Partials<'_> {
         let partials = cx.intermediate(&tiles, Shape::floats(groups * left * 4 * self.parts));
         let scratch = if left < lanes { self.parts * lanes / 2 } else { 0 };
         let pass = cx
-            .pass(&tiles, shader)
+            .pass(&tiles, extended(shader, &shader!("analysis/partials").source))
             .entry(Entry::Fold(Workspace { own: 0, scratch }))
             .grid(Grid::Walk(walk))
             .read_once("image", self.image)
             .write("partials", partials)
+            .constant("PARTS", self.parts as i32)
             .constant("LEFT", left as i32);
         with(pass).add();
         partials
     }
-}
 
-/// The pass that combines what a fold leaves, in one workgroup.
-fn total<'a>(
-    cx: &mut Lowering<'a>,
-    suffix: &str,
-    shader: Shader,
-    partials: ResourceId,
-    outs: &[(&str, ResourceId)],
-    with: impl for<'b> FnOnce(PassBuilder<'b, 'a>) -> PassBuilder<'b, 'a>,
-) {
-    let pass = cx.pass(suffix, shader).entry(Entry::Kernel).read("partials", partials, Reach::Whole).grid(Grid::Groups([1, 1, 1]));
-    let pass = outs.iter().fold(pass, |pass, (port, out)| pass.write(port, *out));
-    with(pass).add();
+    /// The pass that combines what the fold left, in one workgroup.
+    fn total<'a>(
+        &self,
+        cx: &mut Lowering<'a>,
+        shader: &Shader,
+        table: ResourceId,
+        outs: &[(&str, ResourceId)],
+        with: impl for<'b> FnOnce(PassBuilder<'b, 'a>) -> PassBuilder<'b, 'a>,
+    ) {
+        let pass = cx
+            .pass(self.suffix, extended(shader, &shader!("analysis/partials_total").source))
+            .entry(Entry::Kernel)
+            .read("partials", table, Reach::Whole)
+            .grid(Grid::Groups([1, 1, 1]))
+            .constant("PARTS", self.parts as i32);
+        let pass = outs.iter().fold(pass, |pass, (port, out)| pass.write(port, *out));
+        with(pass).add();
+    }
 }
 
 /// Most pixels of a tile's height: images larger than memory pass by in bands of whole tiles.
