@@ -306,6 +306,22 @@ fn how_work_is_cut_into_dispatches_changes_no_bit() {
     }
 }
 
+/// All paths end in the same step, so that more threads ask for the last pixel of a slice than there are pixels.
+#[test]
+fn threads_that_come_too_late_for_a_pixel_leave_the_next_ones() {
+    let mut bench = Bench::new();
+    for (profile, width, height) in [(Profile::Cpu, 141, 121), (Profile::Gpu, 1061, 1011)] {
+        let camera = format!("camera: (eye: (0.6, 0.5, 0.9), fov: 60, size: ({width}, {height}))");
+        let node = format!("GatherWalk(medium: Homogeneous(0), light: Point([0.5, 0.9, 0.5]), {camera}, paths: 1)");
+        let text = format!(r#"Graph(version: 1, inputs: {{}}, nodes: {{"a": {node}}}, outputs: {{"out": "a"}})"#);
+        let graph = compile(&text, &[]).unwrap_or_else(|e| panic!("{e}"));
+        let limits = Limits { profile, ..bench.limits() };
+        let plan = plan(&graph, &limits, &Options::default()).unwrap_or_else(|e| panic!("{e}"));
+        let picture = bench.run(&graph, plan, &volume).unwrap_or_else(|e| panic!("{e}"));
+        assert!(picture["out"].len() == 4 * width * height && picture["out"].iter().all(|v| *v == 0.0));
+    }
+}
+
 #[test]
 fn more_photons_can_be_added_to_an_earlier_result() {
     let mut bench = Bench::new();

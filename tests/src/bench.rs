@@ -3,6 +3,7 @@
 use std::collections::HashMap;
 use std::path::Path;
 use std::sync::Arc;
+use std::time::Duration;
 
 use pipe_gpu::{Choice, Device, Executor, RunOptions};
 use pipe_graph::diagnostic::{Diagnostics, Sources};
@@ -68,6 +69,9 @@ pub fn plan(graph: &Graph, limits: &Limits, options: &Options) -> Result<Plan, S
     pipe_plan::plan_graph(graph, &Rim::default(), limits, options, &|_| true).map_err(|e| e.to_string())
 }
 
+/// What runs longer will not end.
+const PATIENCE: Duration = Duration::from_secs(300);
+
 /// The values of a graph's outputs by name.
 pub type Values = HashMap<String, Vec<f64>>;
 
@@ -102,7 +106,10 @@ impl Bench {
         // Every graph is a first frame.
         self.executor.forget();
         let prepared = self.executor.prepare(Arc::new(plan)).map_err(|e| e.to_string())?;
-        let outputs = self.executor.run(&prepared, &given, &RunOptions::default()).map_err(|e| e.to_string())?;
+        let outputs = self
+            .executor
+            .run(&prepared, &given, &RunOptions { timeout: Some(PATIENCE), ..RunOptions::default() })
+            .map_err(|e| e.to_string())?;
         self.executor.release(prepared);
         let mut values = Values::new();
         for (name, value) in graph.outputs() {
