@@ -6,8 +6,8 @@ fn each(xy: vec2i) {
     for (var k = -RADIUS; k <= RADIUS; k++) {
         let w = load_weights(k + RADIUS);
         let y = load_luminances(xy + vec2i(k, 0)).xy;
-        moments += w * vec4f(y, y * y);
-        product += w * y.x * y.y;
+        moments = fma(vec4f(w), vec4f(y, y * y), moments);
+        product = fma(w, y.x * y.y, product);
     }
     store_moments(xy, moments);
     store_products(xy, vec4f(product));
