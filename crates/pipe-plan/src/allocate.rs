@@ -653,6 +653,7 @@ impl Launched {
             let [x, y] = match place.what {
                 Placed::GridFirst => origin(&grid),
                 Placed::GridEnd => [grid.x.end as i32, grid.y.end as i32],
+                Placed::Whole => windows.size.map(|n| n as i32),
                 Placed::First(id) => origin(&windows.part(id, tile)),
                 Placed::Size(id) => windows.part(id, tile).size().map(|n| n as i32),
             };

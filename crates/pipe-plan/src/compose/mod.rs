@@ -98,8 +98,8 @@ impl<'a> Composer<'a> {
             bindings.push(ports::binding(b.shape, b.use_, self.limits));
             resources.push(b.resource);
             match (b.shape, windows) {
-                (Shape::Image(t), Some(w)) if in_part(b.resource).is_some() => {
-                    ports::declare_window(&mut io, i, at, t, b.use_, w.size, self.limits);
+                (Shape::Image(t), Some(_)) if in_part(b.resource).is_some() => {
+                    ports::declare_window(&mut io, i, at, t, b.use_, self.limits);
                 }
                 (Shape::Image(t), Some(_)) if b.use_ != Use::Read => ports::declare_tile(&mut io, i, at, t, self.limits),
                 _ => ports::declare(&mut io, i, at, b.shape, b.use_, self.limits),

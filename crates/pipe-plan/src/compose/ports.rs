@@ -76,10 +76,9 @@ fn element(shape: Shape) -> &'static str {
     }
 }
 
-/// Declares an image of which only a window is held: positions are those in the whole image, of this size.
-pub(super) fn declare_window(io: &mut String, i: usize, at: usize, image: ImageType, use_: Use, size: [u32; 2], limits: &Limits) {
+/// Declares an image of which only a window is held: positions and the size are those of the whole image.
+pub(super) fn declare_window(io: &mut String, i: usize, at: usize, image: ImageType, use_: Use, limits: &Limits) {
     let head = format!("@group(0) @binding({at})");
-    let [w, h] = size;
     let _ = match use_ {
         // Loops compute more than the window holds; nobody uses what they make of the pixels at its edge.
         Use::Read => writeln!(
@@ -97,7 +96,7 @@ pub(super) fn declare_window(io: &mut String, i: usize, at: usize, image: ImageT
             texel(image.channels, image.precision, limits)
         ),
     };
-    let _ = writeln!(io, "fn size_r{i}() -> vec2i {{ return vec2i({w}, {h}); }}");
+    let _ = writeln!(io, "fn size_r{i}() -> vec2i {{ return uniforms.whole; }}");
 }
 
 /// Declares an image that is held whole and written tile by tile: what belongs to other tiles is left alone.
