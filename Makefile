@@ -5,9 +5,6 @@ IMAGE := tests/data/workshop.exr
 
 .PHONY: demo test test-large build setup fmt clippy generated gallery goldens
 
-# Vulkan's layers complain where there is no session.
-export XDG_RUNTIME_DIR ?= /tmp
-
 # The main job on a real photograph: tone mapping. Prints the plan and where the picture is.
 demo: setup
 	$(CARGO) build --release --locked --package pipe

@@ -130,6 +130,21 @@ const fn rank(kind: DeviceType) -> (u8, &'static str) {
     }
 }
 
+/// Keeps Mesa's Vulkan layers from writing "error: XDG_RUNTIME_DIR is invalid or not set" to the user's terminal where there
+/// is no session, as in containers: they look there for a display, which nobody needs here. Does nothing once the process
+/// has a second thread; so it is for the first lines of `main`.
+pub fn hush_layers() {
+    const NAME: &str = "XDG_RUNTIME_DIR";
+    let alone = std::fs::read_dir("/proc/self/task").is_ok_and(|tasks| tasks.count() == 1);
+    if alone && std::env::var_os(NAME).is_none() {
+        // SAFETY: this is the only thread, so nobody reads the environment meanwhile.
+        #[allow(unsafe_code)]
+        unsafe {
+            std::env::set_var(NAME, "/nonexistent");
+        }
+    }
+}
+
 fn adapters(options: OpenOptions) -> Vec<wgpu::Adapter> {
     let mut desc = wgpu::InstanceDescriptor::new_without_display_handle();
     desc.backends = Backends::VULKAN | Backends::METAL | Backends::DX12;

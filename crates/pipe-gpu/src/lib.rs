@@ -25,7 +25,7 @@ mod storage;
 mod tiles;
 mod transfer;
 
-pub use adapter::{AdapterDescription, Choice, OpenOptions, enumerate, enumerate_with};
+pub use adapter::{AdapterDescription, Choice, OpenOptions, enumerate, enumerate_with, hush_layers};
 pub use device::Device;
 pub use error::GpuError;
 pub use execute::{Executor, Outputs, Part, RunOptions, Timings};

@@ -65,6 +65,15 @@ fn is_whole_png(bytes: &[u8]) -> bool {
 }
 
 #[test]
+fn what_works_says_nothing() {
+    let folder = folder();
+    // As in a container, where no one has a session.
+    let output =
+        command(folder.path(), &["run", "tone-map", "in.exr", "out.png"]).env_remove("XDG_RUNTIME_DIR").output().expect("it starts");
+    assert!(output.status.success() && output.stdout.is_empty() && message(&output).is_empty(), "{}", message(&output));
+}
+
+#[test]
 fn a_wrong_graph_or_command_line_is_1_and_a_wrong_world_is_2() {
     let folder = folder();
     let folder = folder.path();

@@ -32,6 +32,7 @@ pub(crate) fn main() -> ExitCode {
             return ExitCode::from(u8::from(e.use_stderr()));
         }
     };
+    pipe_gpu::hush_layers();
     output::set_verbosity(cli.quiet, cli.verbose);
     let result = match cli.verb {
         Verb::Run(a) => run::run(&a),
