@@ -120,11 +120,56 @@ fn scopes_in_tiles() {
     );
 }
 
+/// Windows lie elsewhere, in images of other sizes.
+#[test]
+fn crops_and_resizes_in_tiles() {
+    same_in_tiles(
+        r#""c": Crop(image: "in", x: 7, y: 5, width: 31, height: 40), "b": GaussianBlur(image: "c", sigma: 1), "p": Pad(image: "b", left: 3, top: 9, right: 12, fill: Mirror),
+           "o": Offset(image: "p", x: -20, y: 11)"#,
+        r#""out": "o", "cropped": "c""#,
+    );
+    for filter in ["Box", "Linear", "Lanczos3"] {
+        same_in_tiles(
+            &format!(
+                r#""s": Resize(image: "in", width: 23, height: 31, filter: {filter}), "e": Exposure(image: "s", ev: 1), "l": Resize(image: "e", scale: 3.7, filter: {filter}),
+                   "f": Resize(image: "in", width: 90, height: 40, fit: Letterbox, filter: {filter})"#
+            ),
+            r#""small": "s", "large": "l", "framed": "f""#,
+        );
+    }
+    same_in_tiles(
+        r#""half": Resize(image: "in", scale: 0.5), "back": Resize(image: "half", width: 61, height: 47), "d": Math(a: "in", b: "back", op: Sub), "s": Stats(image: "d"),
+           "n": Math(a: "d", b: "grey", op: Max)"#,
+        r#""out": "n", "most": "s.max""#,
+    );
+}
+
+#[test]
+fn flips_and_quarter_turns_in_tiles() {
+    for direction in ["Horizontal", "Vertical", "Both"] {
+        same_in_tiles(
+            &format!(
+                r#""b": BoxBlur(image: "in", radius: 2), "f": Flip(image: "b", direction: {direction}), "m": Mix(a: "f", b: "in", factor: 0.3)"#
+            ),
+            r#""out": "m""#,
+        );
+    }
+    for turns in [-1, 1, 2] {
+        same_in_tiles(
+            &format!(
+                r#""b": BoxBlur(image: "in", radius: 2), "t": Rotate90(image: "b", turns: {turns}), "l": Laplacian(image: "t"), "back": Rotate90(image: "l", turns: {turns}),
+                   "c": Math(a: "back", b: "in", op: Add)"#
+            ),
+            r#""out": "l", "back": "c""#,
+        );
+    }
+}
+
 /// What somebody reads from anywhere is made in tiles and held whole.
 #[test]
 fn an_image_that_is_read_from_anywhere_is_held() {
     same_in_tiles(
-        r#""b": GaussianBlur(image: "in", sigma: 1), "f": Flip(image: "b"), "c": Mix(a: "f", b: "b", factor: 0.4)"#,
+        r#""b": GaussianBlur(image: "in", sigma: 1), "t": Transform(image: "b", rotate: 20), "c": Mix(a: "t", b: "b", factor: 0.4)"#,
         r#""out": "c""#,
     );
 }
@@ -145,9 +190,9 @@ fn a_budget_decides() {
     let message = with(&blur, 4 << 10).expect_err("nothing fits into 4 KiB");
     assert!(message.contains("tiles do not help"), "{message}");
 
-    let flip = r#"Graph(version: 1, inputs: {"in": Image}, nodes: {"a": Exposure(image: "in", ev: 1), "turned": Rotate90(image: "a")}, outputs: {"out": "turned"})"#;
-    let flip = compile(flip, &types).unwrap_or_else(|e| panic!("{e}"));
-    let message = with(&flip, 1 << 20).expect_err("a rotated image is held whole");
+    let turn = r#"Graph(version: 1, inputs: {"in": Image}, nodes: {"a": Exposure(image: "in", ev: 1), "turned": Transform(image: "a", rotate: 30)}, outputs: {"out": "turned"})"#;
+    let turn = compile(turn, &types).unwrap_or_else(|e| panic!("{e}"));
+    let message = with(&turn, 1 << 20).expect_err("a rotated image is held whole");
     assert!(message.contains("needs 4.0 MiB whole, since `turned` reads it from anywhere"), "{message}");
 }
 

@@ -30,7 +30,8 @@ pub mod prelude {
     pub use crate::lowering::{Carried, Lowering, MeshParts};
     pub use crate::node::{Category, FileElement, FileSource, Inputs, Kind, Mistake, Node, Opening, Output, Port, ReadbackFile, TableFile};
     pub use crate::pass::{
-        Access, Border, Constant, Count, Entry, Filter, Grid, Profile, Reach, ResourceId, Shader, Shape, Value, Values, Walk, Workspace,
+        Access, Border, Constant, Count, Entry, Filter, Grid, Profile, Reach, ResourceId, Shader, Shape, Stretch, Value, Values, Walk,
+        Workspace,
     };
     pub use crate::reference::{Block, Raster, Reference, Tensor, Triangles, luminance, narrow};
     pub use crate::types::{EdgeKind, EdgeType, Element, ImageType, MeshType, Precision, ScalarType, TableType, VolumeType};

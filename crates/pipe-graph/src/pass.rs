@@ -163,8 +163,50 @@ pub enum Reach {
     Point,
     /// At most this many pixels to either side along x and y, in an input of the output's size.
     Around(u32, u32),
+    /// At pixels elsewhere in an input of any size: where along its x, and where along its y.
+    Elsewhere([Stretch; 2]),
     /// Anywhere.
     Whole,
+}
+
+impl Reach {
+    /// One pixel, so far away along x and y.
+    pub fn shifted(by: [i32; 2]) -> Self {
+        Self::Elsewhere([0, 1].map(|axis| Stretch::shift(axis, by[axis])))
+    }
+}
+
+/// Where output pixels look along one axis of an input: pixel i at `count` pixels from ⌊i·num/den⌋ + `first` on. What of
+/// them is outside the input follows its border policy.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub struct Stretch {
+    /// The axis of the output along which i counts: 0 is x, 1 is y.
+    pub along: usize,
+    /// Input pixels for `den` output pixels; negative where they are read backwards.
+    pub num: i32,
+    /// Not 0.
+    pub den: u32,
+    /// Offset of the first pixel.
+    pub first: i32,
+    /// Not 0.
+    pub count: u32,
+}
+
+impl Stretch {
+    /// One pixel, so many further on.
+    pub const fn shift(along: usize, by: i32) -> Self {
+        Self { along, num: 1, den: 1, first: by, count: 1 }
+    }
+
+    /// One pixel, counted from the other end of an axis of so many.
+    pub const fn mirrored(along: usize, size: u32) -> Self {
+        Self { along, num: -1, den: 1, first: size as i32 - 1, count: 1 }
+    }
+
+    /// The first of the pixels at which pixel `i` looks.
+    pub fn first_of(&self, i: u32) -> i64 {
+        (i64::from(i) * i64::from(self.num)).div_euclid(i64::from(self.den)) + i64::from(self.first)
+    }
 }
 
 /// What an image port answers outside the image.

@@ -351,7 +351,7 @@ impl<'a> Player<'a> {
         let mut lasting: Vec<ValueId> = names.values().copied().collect();
         let mut clears = Vec::new();
         for write in tiling.body.iter().filter_map(|op| if let Op::Pass(pass) = op { Some(&pass.writes) } else { None }).flatten() {
-            if tiling.windows.halos.contains_key(&write.resource) || write.in_place_of.is_some() {
+            if tiling.windows.views.contains_key(&write.resource) || write.in_place_of.is_some() {
                 continue;
             }
             let value = self.begin(write.resource, start);
@@ -653,9 +653,9 @@ impl Launched {
             let [x, y] = match place.what {
                 Placed::GridFirst => origin(&grid),
                 Placed::GridEnd => [grid.x.end as i32, grid.y.end as i32],
-                Placed::Whole => windows.size.map(|n| n as i32),
                 Placed::First(id) => origin(&windows.part(id, tile)),
                 Placed::Size(id) => windows.part(id, tile).size().map(|n| n as i32),
+                Placed::Whole(id) => windows.size_of(id).map(|n| n as i32),
             };
             let at = self.uniform_offset + place.offset as u32;
             uniforms.extend([(at, x), (at + 4, y)]);
@@ -721,7 +721,7 @@ impl Writer<'_> {
             };
             let rect = t.windows.part(brought.resource, tile);
             let Brought { name, plane, .. } = brought.clone();
-            Crossing { name, plane, pixel, size: t.windows.size, rect, slot: slot(value) }
+            Crossing { name, plane, pixel, size: t.windows.size_of(brought.resource), rect, slot: slot(value) }
         };
         let one = |tile: &Rect| {
             let mut uniforms = Vec::new();

@@ -319,6 +319,7 @@ fn taps(consumer: &KernelPass, result: ResourceId) -> Result<u32, String> {
             Reach::Point => 1,
             Reach::Around(x, y) => (2 * x + 1).saturating_mul(2 * y + 1),
             Reach::Whole if port.once => 1,
+            Reach::Elsewhere(_) => return Err("it is read at other places".to_owned()),
             Reach::Whole => return Err("it is read from anywhere".to_owned()),
         };
         Ok(taps.saturating_add(more))

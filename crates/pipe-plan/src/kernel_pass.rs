@@ -14,7 +14,7 @@ use pipe_graph::pass::{
 };
 
 use crate::plan::Rect;
-use crate::window::{Halo, Windows};
+use crate::window::Windows;
 
 /// Where a port's values come from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -167,9 +167,8 @@ impl KernelPass {
 
     /// The part of the grid that a tile runs: pixels, blocks, or (along x alone) groups of pixels of a file.
     pub(crate) fn grid_in(&self, ops: &Ops, windows: &Windows, tile: &Rect) -> Rect {
-        let written = self.writes.iter().filter_map(|w| windows.halos.get(&w.resource));
-        let halo = written.copied().reduce(Halo::union);
-        let covered = windows.widened(tile, halo.unwrap_or_default());
+        let written = self.writes.iter().filter_map(|w| windows.window(w.resource, tile));
+        let covered = written.reduce(|a, b| a.hull(&b)).unwrap_or_else(|| tile.clone());
         match (self.block(), self.grid) {
             (Some(block), _) => {
                 // A block that makes pixels runs wherever the window meets it; others in the tile that they begin in.

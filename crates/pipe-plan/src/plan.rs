@@ -223,6 +223,12 @@ impl Rect {
         let [w, h] = self.size();
         w as u64 * h as u64
     }
+
+    /// The smallest that holds both.
+    pub(crate) fn hull(&self, other: &Self) -> Self {
+        let both = |a: &Range<u32>, b: &Range<u32>| a.start.min(b.start)..a.end.max(b.end);
+        Self { x: both(&self.x, &other.x), y: both(&self.y, &other.y) }
+    }
 }
 
 /// Images that are made tile by tile, since they do not fit whole. The same steps run for every tile, row by row of tiles,

@@ -71,7 +71,7 @@ impl Node for Crop {
         }
         let out = cx.output("out");
         cx.pass("", shader!("composite/crop"))
-            .read("image", image, Reach::Whole)
+            .read_with("image", image, Reach::shifted([self.x as i32, self.y as i32]), Border::Clamp, Filter::Nearest)
             .write("out", out)
             .values(Values::Read)
             .param("origin", [self.x as i32, self.y as i32])

@@ -46,12 +46,15 @@ impl Node for Flip {
 
     fn lower(&self, cx: &mut Lowering<'_>) -> Result<(), Mistake> {
         let (image, out) = (cx.input(&self.image), cx.output("out"));
+        let size = cx.image_of(image).size;
+        let flipped = [self.direction != Direction::Vertical, self.direction != Direction::Horizontal];
+        let looks = [0, 1].map(|i| if flipped[i] { Stretch::mirrored(i, size[i]) } else { Stretch::shift(i, 0) });
         cx.pass("", shader!("composite/flip"))
-            .read("image", image, Reach::Whole)
+            .read_with("image", image, Reach::Elsewhere(looks), Border::Clamp, Filter::Nearest)
             .write("out", out)
             .values(Values::Read)
-            .constant("X", self.direction != Direction::Vertical)
-            .constant("Y", self.direction != Direction::Horizontal)
+            .constant("X", flipped[0])
+            .constant("Y", flipped[1])
             .add();
         Ok(())
     }

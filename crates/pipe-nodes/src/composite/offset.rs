@@ -48,7 +48,7 @@ impl Node for Offset {
         let out = cx.output("out");
         let border = if self.wrap { Border::Repeat } else { cx.border() };
         cx.pass("", shader!("composite/offset"))
-            .read_with("image", image, Reach::Whole, border, Filter::Nearest)
+            .read_with("image", image, Reach::shifted([-self.x, -self.y]), border, Filter::Nearest)
             .write("out", out)
             .values(Values::Read)
             .param("offset", [self.x, self.y])

@@ -93,8 +93,9 @@ impl Node for Pad {
             return Ok(());
         }
         let out = cx.output("out");
+        let reach = Reach::shifted([self.left, self.top].map(|n| -(n as i32)));
         cx.pass("", shader!("composite/pad"))
-            .read_with("image", image, Reach::Whole, self.fill.border(), Filter::Nearest)
+            .read_with("image", image, reach, self.fill.border(), Filter::Nearest)
             .write("out", out)
             .constant("COLORED", self.fill.color().is_some())
             .param("origin", [self.left as i32, self.top as i32])

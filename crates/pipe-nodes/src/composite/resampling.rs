@@ -90,7 +90,7 @@ impl Axis {
 
     /// Where output pixel `i` lies in the input.
     fn centre(&self, i: u32) -> f64 {
-        self.start + (f64::from(i) + 0.5) * self.extent / f64::from(self.output)
+        self.start + (f64::from(i) + 0.5) * (self.extent / f64::from(self.output))
     }
 
     /// How much the kernel is stretched.
@@ -104,7 +104,8 @@ impl Axis {
         let support = kernel.radius() * stretch;
         let first = (centre - support + 0.5).floor() as i64;
         let end = ((centre + support + 0.5).floor() as i64).max(first + 1);
-        let mut weights: Vec<f64> = (first..end).map(|x| kernel.weight((x as f64 + 0.5 - centre) / stretch)).collect();
+        // In this order of operations, by which Pillow decides to which of two boxes a pixel on their edge belongs.
+        let mut weights: Vec<f64> = (first..end).map(|x| kernel.weight((x as f64 - centre + 0.5) * (1.0 / stretch))).collect();
         let sum: f64 = weights.iter().sum();
         for w in &mut weights {
             *w /= sum;
@@ -156,6 +157,16 @@ struct Taps {
     step: i32,
 }
 
+impl Taps {
+    /// Where output pixels look along an axis.
+    fn stretch(&self, along: usize, axis: &Axis) -> Stretch {
+        let straight = Stretch { along, num: (axis.extent.round() as i32).max(1), den: axis.output, first: 0, count: 1 };
+        let off = || (0..).zip(&self.firsts).map(|(i, first)| i64::from(*first as i32) - straight.first_of(i));
+        let (least, most) = (off().min().unwrap_or(0), off().max().unwrap_or(0));
+        Stretch { first: least as i32, count: (most - least) as u32 + self.width as u32, ..straight }
+    }
+}
+
 const fn gcd(a: u32, b: u32) -> u32 {
     if b == 0 { a } else { gcd(b, a % b) }
 }
@@ -177,9 +188,11 @@ pub(super) fn lower(cx: &mut Lowering<'_>, image: ResourceId, kernel: Kernel, ax
         let taps = axes[axis].taps(kernel, border);
         let firsts = cx.uints(["x_firsts", "y_firsts"][axis], &taps.firsts);
         let weights = cx.floats(["x_weights", "y_weights"][axis], &taps.weights);
+        let mut looks = [0, 1].map(|along| Stretch::shift(along, 0));
+        looks[axis] = taps.stretch(axis, &axes[axis]);
         let suffix = if work.len() == 1 && out.is_some() { "" } else { ["x", "y"][axis] };
         cx.pass(suffix, shader!("composite/resample"))
-            .read("image", current, Reach::Whole)
+            .read("image", current, Reach::Elsewhere(looks))
             .read("firsts", firsts, Reach::Whole)
             .read("weights", weights, Reach::Whole)
             .write("out", target)

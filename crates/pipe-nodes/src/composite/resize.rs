@@ -133,8 +133,9 @@ impl Node for Resize {
         if to.out != to.axes.map(|axis| axis.output) {
             let resized = resampling::lower(cx, image, self.filter, to.axes, None);
             let out = cx.output("out");
+            let reach = Reach::shifted(to.origin.map(|n| -(n as i32)));
             cx.pass("frame", shader!("composite/pad"))
-                .read_with("image", resized, Reach::Whole, Border::Black, Filter::Nearest)
+                .read_with("image", resized, reach, Border::Black, Filter::Nearest)
                 .write("out", out)
                 .constant("COLORED", true)
                 .param("origin", to.origin.map(|n| n as i32))

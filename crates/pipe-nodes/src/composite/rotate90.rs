@@ -49,8 +49,14 @@ impl Node for Rotate90 {
             return Ok(());
         }
         let out = cx.output("out");
+        let [w, h] = cx.image_of(image).size;
+        let looks = match turns {
+            1 => [Stretch::shift(1, 0), Stretch::mirrored(0, h)],
+            2 => [Stretch::mirrored(0, w), Stretch::mirrored(1, h)],
+            _ => [Stretch::mirrored(1, w), Stretch::shift(0, 0)],
+        };
         cx.pass("", shader!("composite/rotate90"))
-            .read("image", image, Reach::Whole)
+            .read_with("image", image, Reach::Elsewhere(looks), Border::Clamp, Filter::Nearest)
             .write("out", out)
             .values(Values::Read)
             .constant("TURNS", turns)

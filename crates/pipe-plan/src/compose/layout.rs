@@ -30,12 +30,12 @@ pub(crate) enum Placed {
     /// The first pixel (or block) that the grid covers, and the one behind its last.
     GridFirst,
     GridEnd,
-    /// Width and height of the images. No constant, as it is none where an image is held whole: compilers divide by
-    /// constants in other ways.
-    Whole,
     /// The first pixel of a window, and its size.
     First(ResourceId),
     Size(ResourceId),
+    /// Width and height of the image that it shows. No constant, as it is none where an image is held whole: compilers
+    /// divide by constants in other ways.
+    Whole(ResourceId),
 }
 
 struct Field {
@@ -95,8 +95,9 @@ impl Block {
         }
         let mut places = Vec::new();
         if let Some(windowed) = windowed {
-            let of_windows = windowed.iter().flat_map(|(i, id)| [(Placed::First(*id), *i), (Placed::Size(*id), *i)]);
-            for (what, bound) in [(Placed::GridFirst, 0), (Placed::GridEnd, 0), (Placed::Whole, 0)].into_iter().chain(of_windows) {
+            let of_windows =
+                windowed.iter().flat_map(|(i, id)| [Placed::First(*id), Placed::Size(*id), Placed::Whole(*id)].map(|what| (what, *i)));
+            for (what, bound) in [(Placed::GridFirst, 0), (Placed::GridEnd, 0)].into_iter().chain(of_windows) {
                 offset = offset.next_multiple_of(8);
                 places.push(Place { what, bound, offset });
                 offset += 8;
@@ -125,9 +126,9 @@ impl Block {
             let _ = match place.what {
                 Placed::GridFirst => writeln!(fields, "    grid_first: vec2i,"),
                 Placed::GridEnd => writeln!(fields, "    grid_end: vec2i,"),
-                Placed::Whole => writeln!(fields, "    whole: vec2i,"),
                 Placed::First(_) => writeln!(fields, "    r{}_first: vec2i,", place.bound),
                 Placed::Size(_) => writeln!(fields, "    r{}_size: vec2i,", place.bound),
+                Placed::Whole(_) => writeln!(fields, "    r{}_whole: vec2i,", place.bound),
             };
         }
         format!("struct Uniforms {{\n{fields}}}\n@group(0) @binding(0) var<uniform> uniforms: Uniforms;\n")

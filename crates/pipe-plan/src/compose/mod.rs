@@ -77,10 +77,10 @@ impl<'a> Composer<'a> {
         let drivers: Vec<ResourceId> = distinct(pass.drivers());
         let windowed = windows.map(|w| {
             let image_written = |b: &Bound| b.use_ != Use::Read && matches!(b.shape, Shape::Image(_));
-            let held = bound.iter().enumerate().filter(|(_, b)| w.halos.contains_key(&b.resource) || image_written(b));
+            let held = bound.iter().enumerate().filter(|(_, b)| w.views.contains_key(&b.resource) || image_written(b));
             held.map(|(i, b)| (i, b.resource)).collect::<Vec<_>>()
         });
-        let in_part = |id: ResourceId| windows.filter(|w| w.halos.contains_key(&id));
+        let in_part = |id: ResourceId| windows.filter(|w| w.views.contains_key(&id));
         let block = layout::Block::new(pass, windowed.as_deref());
         let uniforms = block.bytes(pass);
         let has_uniform = !uniforms.is_empty();

@@ -96,7 +96,7 @@ pub(super) fn declare_window(io: &mut String, i: usize, at: usize, image: ImageT
             texel(image.channels, image.precision, limits)
         ),
     };
-    let _ = writeln!(io, "fn size_r{i}() -> vec2i {{ return uniforms.whole; }}");
+    let _ = writeln!(io, "fn size_r{i}() -> vec2i {{ return uniforms.r{i}_whole; }}");
 }
 
 /// Declares an image that is held whole and written tile by tile: what belongs to other tiles is left alone.

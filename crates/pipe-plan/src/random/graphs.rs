@@ -8,7 +8,7 @@ use std::collections::BTreeSet;
 use indexmap::IndexMap;
 use pipe_graph::pass::{
     Access, Border, Constant, Count, Entry, Fetch, Filter, Grid, Item, Kept, Loop, NodeLabel, Origin, Pass, PassGraph, Reach, Read,
-    Resource, ResourceId, Shader, Shape, State, Value, Values, Walk, Workspace, Write,
+    Resource, ResourceId, Shader, Shape, State, Stretch, Value, Values, Walk, Workspace, Write,
 };
 use pipe_graph::types::{ImageType, Precision, VolumeType};
 
@@ -275,12 +275,35 @@ impl Maker {
         self.pass(Entry::At, reads, vec![(shape, Access::Store, None)], Grid::Cover);
     }
 
-    /// Reads an image from anywhere, of whatever size.
+    /// Where pixels of an image of one size look in one of another: a resized one, a part of it, pixels beyond its edges,
+    /// a mirrored or a turned one.
+    fn elsewhere(&mut self, from: [u32; 2], to: [u32; 2]) -> Reach {
+        let kind = self.numbers.below(5);
+        let turned = self.numbers.one_in(4);
+        let axis = |i: usize, by: i32| {
+            let along = if turned { 1 - i } else { i };
+            match kind {
+                0 => Stretch { along, num: from[i] as i32, den: to[along], first: -2, count: 5 },
+                1 => Stretch::shift(along, by),
+                2 => Stretch::mirrored(along, from[i]),
+                3 => Stretch { along, num: -1, den: 3, first: by + 20, count: 3 },
+                _ => Stretch { along, num: 3, den: 2, first: by, count: 4 },
+            }
+        };
+        let by = [0; 2].map(|_| self.numbers.below(60) as i32 - 30);
+        Reach::Elsewhere([axis(0, by[0]), axis(1, by[1])])
+    }
+
+    /// Reads an image of whatever size, from anywhere or elsewhere.
     fn whole(&mut self) {
         let from = self.find(is_image).expect("a graph begins with an image");
-        let mut reads = vec![self.read(from, Reach::Whole)];
-        self.aside(&mut reads);
         let size = self.size();
+        let reach = match self.shape(from) {
+            Shape::Image(t) if !self.numbers.one_in(3) => self.elsewhere(t.size, size),
+            _ => Reach::Whole,
+        };
+        let mut reads = vec![self.read(from, reach)];
+        self.aside(&mut reads);
         let shape = self.image_shape(size);
         self.pass(Entry::At, reads, vec![(shape, Access::Store, None)], Grid::Cover);
     }

@@ -208,7 +208,7 @@ impl<'a> Machine<'a> {
             let driver = || first_driver + drivers.iter().position(|d| *d == id).expect("it is read");
             self.slots[at(place.unwrap_or_else(driver))]
         };
-        let whole = |w: usize| self.tiling.is_some_and(|t| !t.windows.halos.contains_key(&pass.writes[w].resource));
+        let whole = |w: usize| self.tiling.is_some_and(|t| !t.windows.views.contains_key(&pass.writes[w].resource));
         // What later tiles add to is taken to be what the first began with.
         let before = |w: usize| if self.later_tile && whole(w) { ZERO } else { self.slots[at(first_write + w)] };
         let mut made = meaning::of_pass(pass, self.ops, &read, &before);

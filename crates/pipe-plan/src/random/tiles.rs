@@ -5,7 +5,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
 
-use pipe_graph::pass::{Access, Border, Count, Grid, Origin, Reach, ResourceId};
+use pipe_graph::pass::{Access, Border, Count, Grid, Origin, Reach, ResourceId, Stretch};
 
 use crate::kernel_pass::{KernelPass, LoopOp, Op, Ops, Portion, Source, TilingOp};
 use crate::plan::Rect;
@@ -64,7 +64,7 @@ fn round(tiling: &TilingOp, ops: &Ops, complete: &BTreeSet<ResourceId>) -> Resul
             if !covers(valid, &window) {
                 return Err(format!("{}: of {window:?} only {valid:?} is valid", fetch.name));
             }
-            let [w, h] = tiling.windows.size;
+            let [w, h] = tiling.windows.size_of(fetch.resource);
             let counts = painted.entry(fetch.resource).or_insert_with(|| vec![0; (w * h) as usize]);
             let [columns, rows] = window;
             for y in rows {
@@ -77,7 +77,7 @@ fn round(tiling: &TilingOp, ops: &Ops, complete: &BTreeSet<ResourceId>) -> Resul
     }
     let mut whole = Vec::new();
     for pass in tiling.body.iter().filter_map(|op| if let Op::Pass(pass) = op { Some(pass) } else { None }) {
-        for write in pass.writes.iter().filter(|w| !tiling.windows.halos.contains_key(&w.resource)) {
+        for write in pass.writes.iter().filter(|w| !tiling.windows.views.contains_key(&w.resource)) {
             if ops.shape(write.resource).plane().is_none() {
                 every_block(pass, write.access, tiling.windows.size, &runs)?;
             }
@@ -123,6 +123,27 @@ fn within(valid: &Area, reach: [u32; 2], size: [u32; 2]) -> Area {
     })
 }
 
+/// Those of some pixels that look at valid ones only, pixel by pixel.
+fn looking_at(valid: &Area, there: [u32; 2], looks: [Stretch; 2], border: Border, of: &Area) -> Area {
+    let mut area = [0..0, 0..0];
+    for (i, look) in looks.into_iter().enumerate() {
+        let n = i64::from(there[i]);
+        let place = |x: i64| match border {
+            // Reflections of reflections too.
+            Border::Mirror => x.rem_euclid(2 * n).min(2 * n - 1 - x.rem_euclid(2 * n)),
+            _ => x.clamp(0, n - 1),
+        };
+        let good = |at: &u32| {
+            let first = look.first_of(*at);
+            (first..first + i64::from(look.count)).all(|x| valid[i].contains(&(place(x) as u32)))
+        };
+        let of = of[look.along].clone();
+        let first = of.clone().find(good).unwrap_or(of.end);
+        area[look.along] = first..(first..of.end).find(|at| !good(at)).unwrap_or(of.end);
+    }
+    area
+}
+
 struct AtTile<'a> {
     tiling: &'a TilingOp,
     ops: &'a Ops,
@@ -164,8 +185,17 @@ impl AtTile<'_> {
     }
 
     fn pass(&mut self, pass: &KernelPass) -> Result<(), String> {
-        let size = self.tiling.windows.size;
+        let size = self.tiling.windows.size_of(pass.writes[0].resource);
         let full: Area = [0..size[0], 0..size[1]];
+        let grid = pass.grid_in(self.ops, &self.tiling.windows, self.tile);
+        let grid: Area = [grid.x, grid.y];
+        // The pixels that it makes: those of its windows, or all of its blocks.
+        let windows = pass.writes.iter().filter_map(|w| self.tiling.windows.window(w.resource, self.tile));
+        let asked = windows.reduce(|a, b| a.hull(&b)).unwrap_or_else(|| self.tile.clone());
+        let asked: Area = match pass.block() {
+            Some(block) => std::array::from_fn(|i| grid[i].start * block[i]..(grid[i].end * block[i]).min(size[i])),
+            None => [asked.x, asked.y],
+        };
         if pass.drivers().any(|id| !self.complete.contains(&id)) {
             return Err(format!("{} is driven by what is not there", pass.name));
         }
@@ -175,24 +205,25 @@ impl AtTile<'_> {
         for stage in &pass.stages {
             let mut area = full.clone();
             for port in &stage.ports {
-                let from = match port.source {
-                    Source::Stage(k) => stages[k].clone(),
+                let (from, there) = match port.source {
+                    Source::Stage(k) => (stages[k].clone(), size),
                     Source::Read(r) => self.valid_of(pass, pass.reads[r])?,
                 };
-                if from == full {
+                if from == [0..there[0], 0..there[1]] {
                     continue;
                 }
                 match port.reach {
                     Reach::Point | Reach::Around(0, 0) => area = both(&area, &from),
                     Reach::Around(x, y) if port.border != Border::Repeat => area = both(&area, &within(&from, [x, y], size)),
                     Reach::Whole if port.once && pass.block().is_some() => blockwise = both(&blockwise, &from),
-                    Reach::Around(..) | Reach::Whole => return Err(format!("{} looks beyond {from:?}", pass.name)),
+                    Reach::Elsewhere(looks) if port.border != Border::Repeat => {
+                        area = both(&area, &looking_at(&from, there, looks, port.border, &asked));
+                    }
+                    Reach::Around(..) | Reach::Elsewhere(_) | Reach::Whole => return Err(format!("{} looks beyond {from:?}", pass.name)),
                 }
             }
             stages.push(area);
         }
-        let grid = pass.grid_in(self.ops, &self.tiling.windows, self.tile);
-        let grid: Area = [grid.x, grid.y];
         let computed = self.computed(pass, &grid, &blockwise)?;
         for write in &pass.writes {
             let valid = both(&computed, &stages[write.stage]);
@@ -223,20 +254,22 @@ impl AtTile<'_> {
     }
 
     /// Where something that a pass reads is valid: everywhere when it is whole.
-    fn valid_of(&self, pass: &KernelPass, id: ResourceId) -> Result<Area, String> {
+    /// With its size.
+    fn valid_of(&self, pass: &KernelPass, id: ResourceId) -> Result<(Area, [u32; 2]), String> {
         if self.window(id).is_some() {
-            return self.valid.get(&id).cloned().ok_or_else(|| format!("{} reads what nobody made", pass.name));
+            let valid = self.valid.get(&id).cloned().ok_or_else(|| format!("{} reads what nobody made", pass.name))?;
+            return Ok((valid, self.tiling.windows.size_of(id)));
         }
         if !self.complete.contains(&id) {
             return Err(format!("{} reads {} before it is complete", pass.name, self.ops.resources[id.index()].name));
         }
-        let [w, h] = self.tiling.windows.size;
-        Ok([0..w, 0..h])
+        let [w, h] = self.ops.shape(id).plane().unwrap_or(self.tiling.windows.size);
+        Ok(([0..w, 0..h], [w, h]))
     }
 
     /// The pixels that are computed of what is there: all of the grid, or those of blocks that are there whole.
     fn computed(&self, pass: &KernelPass, grid: &Area, blockwise: &Area) -> Result<Area, String> {
-        let size = self.tiling.windows.size;
+        let size = self.tiling.windows.size_of(pass.writes[0].resource);
         if let Some(block) = pass.block() {
             return Ok(std::array::from_fn(|i| {
                 let pixels = |b: u32| b * block[i]..((b + 1) * block[i]).min(size[i]);

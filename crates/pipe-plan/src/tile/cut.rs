@@ -1,5 +1,6 @@
 //! Rounds → tilings: windows from the last pass back to the first, and resources of their own for what is held in part.
 
+use std::collections::btree_map::Entry;
 use std::collections::{BTreeMap, BTreeSet};
 
 use pipe_graph::pass::{Origin, Resource, ResourceId, Shape};
@@ -8,7 +9,15 @@ use super::look::{Look, look, loop_own, loop_reach};
 use super::streams::{Round, Streams, size_of};
 use crate::kernel_pass::{Brought, KernelPass, LoopOp, Op, Ops, Portion, TilingOp};
 use crate::schedule::Schedule;
-use crate::window::{Halo, Windows};
+use crate::window::{Halo, View, Windows};
+
+/// Makes the windows of a resource hold these.
+fn hold(views: &mut BTreeMap<ResourceId, View>, id: ResourceId, view: View) {
+    match views.entry(id) {
+        Entry::Occupied(mut known) => known.get_mut().unite(&view),
+        Entry::Vacant(new) => drop(new.insert(view)),
+    }
+}
 
 impl Streams {
     /// The schedule over tiles of this size.
@@ -44,33 +53,40 @@ impl Streams {
                 pass.writes.retain(|w| self.streamed.contains(&w.resource));
             }
         }
-        let mut halos: BTreeMap<ResourceId, Halo> = BTreeMap::new();
-        let mut work = 0.0;
-        let empty = Windows { size, step, halos: BTreeMap::new() };
-        let area = |halo: Halo| empty.largest(halo).iter().map(|n| f64::from(*n)).product::<f64>();
-        for op in list.iter().rev() {
-            let made = op.results().iter().filter_map(|id| halos.get(id)).fold(Halo::default(), |a, b| a.union(*b));
-            work += match op {
+        let tile = View::tiles(size, step);
+        let mut views: BTreeMap<ResourceId, View> = BTreeMap::new();
+        // Pixels that are computed, and those that there are.
+        let (mut computed, mut all) = (0.0, 0.0);
+        for (op, at) in list.iter().zip(body).rev() {
+            let mut made: Option<View> = None;
+            for id in op.results() {
+                let Some(view) = views.get_mut(&id) else { continue };
+                if ends.contains(at) {
+                    // Whatever others look at, all of it is made.
+                    view.unite(&tile);
+                }
+                made.get_or_insert_with(|| view.clone()).unite(view);
+            }
+            let made = made.unwrap_or_else(|| tile.clone());
+            let pixels = made.size.iter().map(|n| f64::from(*n)).product::<f64>();
+            let (passes, made) = match op {
                 Op::Pass(pass) => {
-                    self.widen(pass, ops, made, step, &mut halos);
-                    area(made)
+                    self.widen(pass, ops, &made, step, &mut views);
+                    (1.0, made)
                 }
-                Op::Loop(l) => {
-                    let wide = self.widen_loop(l, ops, made, step, &mut halos);
-                    area(wide) * l.body.len() as f64
-                }
+                Op::Loop(l) => (l.body.len() as f64, self.widen_loop(l, ops, made, step, &mut views)),
             };
+            computed += made.area() * passes;
+            all += pixels * passes;
         }
-        let passes: usize = list.iter().map(|op| if let Op::Loop(l) = op { l.body.len() } else { 1 }).sum();
-        let work = work / (area(Halo::default()) * passes as f64);
+        let work = computed / all;
 
         // A name of its own for whatever is held in part here.
-        let windows = Windows { size, step, halos };
         let mut names: BTreeMap<ResourceId, ResourceId> = BTreeMap::new();
-        let mut own = Windows { halos: BTreeMap::new(), ..windows.clone() };
-        for (id, halo) in &windows.halos {
+        let mut own = Windows { size, step, views: BTreeMap::new() };
+        for (id, view) in views {
             let Resource { name, shape, origin } = ops.resources[id.index()].clone();
-            let held = windows.largest(*halo);
+            let held = view.largest();
             let shape = match shape {
                 Shape::Image(t) => Shape::Image(t.with_size(held)),
                 Shape::Pixels { pixel, .. } => Shape::Pixels { size: held, pixel },
@@ -78,8 +94,8 @@ impl Streams {
             };
             ops.resources.push(Resource { name, shape, origin });
             let new = ResourceId(ops.resources.len() as u32 - 1);
-            names.insert(*id, new);
-            own.halos.insert(new, *halo);
+            names.insert(id, new);
+            own.views.insert(new, view);
         }
         list.iter_mut().for_each(|op| op.rename(&names));
         let mut uploads = Vec::new();
@@ -107,22 +123,22 @@ impl Streams {
     }
 
     /// Widens the windows of what a pass reads, given that of what it makes.
-    fn widen(&self, pass: &KernelPass, ops: &Ops, made: Halo, step: [u32; 2], halos: &mut BTreeMap<ResourceId, Halo>) {
+    fn widen(&self, pass: &KernelPass, ops: &Ops, made: &View, step: [u32; 2], views: &mut BTreeMap<ResourceId, View>) {
         for write in pass.writes.iter().filter(|w| self.streamed.contains(&w.resource)) {
-            halos.entry(write.resource).or_default();
+            views.entry(write.resource).or_insert_with(|| made.clone());
         }
         for (read, id) in pass.reads.iter().enumerate().filter(|(_, id)| self.streamed.contains(id)) {
             // What a block leaves in a table comes from all of its pixels.
             let leaves_table = pass.writes.iter().any(|w| ops.shape(w.resource).plane().is_none());
             let needed = match (look(pass, read), pass.block()) {
-                (Look::Around(reach), block) if block.is_none() || !leaves_table => made.plus(Halo::around(reach)),
+                (Look::Around(reach), block) if block.is_none() || !leaves_table => made.clone().plus(Halo::around(reach)),
                 (Look::Around(reach) | Look::Block(reach), Some(block)) => {
-                    made.plus(Halo::around(reach)).plus(self.to_blocks(pass, ops, block, step))
+                    made.clone().plus(Halo::around(reach)).plus(self.to_blocks(pass, ops, block, step))
                 }
+                (Look::Elsewhere(looks, border), _) => made.through(looks, border, ops.shape(*id).plane().unwrap_or_default()),
                 _ => unreachable!("what is read from anywhere is not streamed"),
             };
-            let known = halos.entry(*id).or_default();
-            *known = known.union(needed);
+            hold(views, *id, needed);
         }
     }
 
@@ -135,25 +151,20 @@ impl Streams {
         Halo { before: if makes_pixels { after } else { [0, 0] }, after }
     }
 
-    /// The same for a loop; answers how far its own windows reach.
-    fn widen_loop(&self, l: &LoopOp, ops: &Ops, made: Halo, step: [u32; 2], halos: &mut BTreeMap<ResourceId, Halo>) -> Halo {
+    /// The same for a loop; answers its own windows.
+    fn widen_loop(&self, l: &LoopOp, ops: &Ops, made: View, step: [u32; 2], views: &mut BTreeMap<ResourceId, View>) -> View {
         let wide = made.plus(loop_reach(l).unwrap_or_default());
         let inside: BTreeSet<ResourceId> = loop_own(l).into_iter().collect();
-        let mut outside: BTreeMap<ResourceId, Halo> = BTreeMap::new();
+        let mut outside: BTreeMap<ResourceId, View> = BTreeMap::new();
         for op in &l.body {
             if let Op::Pass(pass) = op {
-                self.widen(pass, ops, wide, step, &mut outside);
+                self.widen(pass, ops, &wide, step, &mut outside);
             }
         }
-        for (id, halo) in outside {
-            let own = if inside.contains(&id) { wide } else { halo };
-            let known = halos.entry(id).or_default();
-            *known = known.union(own);
-        }
-        for id in inside.into_iter().chain(l.states.iter().flat_map(|s| [s.init, s.next, s.result])).filter(|id| self.streamed.contains(id))
-        {
-            let known = halos.entry(id).or_default();
-            *known = known.union(wide);
+        let states = l.states.iter().flat_map(|s| [s.init, s.next, s.result]);
+        let whole = inside.iter().copied().chain(states).filter(|id| self.streamed.contains(id)).map(|id| (id, wide.clone()));
+        for (id, view) in outside.into_iter().filter(|(id, _)| !inside.contains(id)).chain(whole.collect::<Vec<_>>()) {
+            hold(views, id, view);
         }
         wide
     }

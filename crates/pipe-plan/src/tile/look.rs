@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use pipe_graph::pass::{Access, Border, Count, Entry, Grid, Reach, ResourceId, Shape, State};
+use pipe_graph::pass::{Access, Border, Count, Entry, Grid, Reach, ResourceId, Shape, State, Stretch};
 
 use crate::kernel_pass::{KernelPass, LoopOp, Op, Ops, Source, Stage};
 use crate::window::Halo;
@@ -14,6 +14,8 @@ pub(super) enum Look {
     Around([u32; 2]),
     /// At the pixels of its block, and so many around them.
     Block([u32; 2]),
+    /// Elsewhere, past the image's edges as the border says, through stages that look at nothing but their pixel.
+    Elsewhere([Stretch; 2], Border),
     /// Anywhere.
     Whole,
 }
@@ -22,7 +24,8 @@ impl Look {
     fn and(self, other: Self) -> Self {
         let max = |a: [u32; 2], b: [u32; 2]| [a[0].max(b[0]), a[1].max(b[1])];
         match (self, other) {
-            (Self::Whole, _) | (_, Self::Whole) => Self::Whole,
+            (a, b) if a == b => a,
+            (Self::Whole | Self::Elsewhere(..), _) | (_, Self::Whole | Self::Elsewhere(..)) => Self::Whole,
             (Self::Around(a), Self::Around(b)) => Self::Around(max(a, b)),
             (Self::Around(a) | Self::Block(a), Self::Around(b) | Self::Block(b)) => Self::Block(max(a, b)),
         }
@@ -32,7 +35,8 @@ impl Look {
     fn through(self, inner: Self) -> Self {
         let add = |a: [u32; 2], b: [u32; 2]| [a[0].saturating_add(b[0]), a[1].saturating_add(b[1])];
         match (self, inner) {
-            (Self::Whole, _) | (_, Self::Whole) => Self::Whole,
+            (look @ Self::Elsewhere(..), Self::Around([0, 0])) | (Self::Around([0, 0]), look @ Self::Elsewhere(..)) => look,
+            (Self::Whole | Self::Elsewhere(..), _) | (_, Self::Whole | Self::Elsewhere(..)) => Self::Whole,
             (Self::Around(a), Self::Around(b)) => Self::Around(add(a, b)),
             (Self::Around(a) | Self::Block(a), Self::Around(b) | Self::Block(b)) => Self::Block(add(a, b)),
         }
@@ -41,36 +45,30 @@ impl Look {
 
 /// How a pass looks at the resource `read`, through whichever of its stages.
 pub(super) fn look(pass: &KernelPass, read: usize) -> Look {
-    fn of_stage(pass: &KernelPass, stage: &Stage, read: usize) -> Look {
-        let none = Look::Around([0, 0]);
-        stage.ports.iter().fold(none, |seen, port| {
-            let inner = match port.source {
-                Source::Read(r) if r == read => none,
-                Source::Read(_) => return seen,
-                Source::Stage(k) if reads(pass, k, read) => of_stage(pass, &pass.stages[k], read),
-                Source::Stage(_) => return seen,
-            };
-            let wraps = |x: u32, y: u32| port.border == Border::Repeat && (x, y) != (0, 0);
-            let own = match port.reach {
-                Reach::Point => Look::Around([0, 0]),
-                // What lies beyond the other edge is never in the window.
-                Reach::Around(x, y) if !wraps(x, y) => Look::Around([x, y]),
-                Reach::Whole if port.once && pass.block().is_some() => Look::Block([0, 0]),
-                Reach::Around(..) | Reach::Whole => Look::Whole,
-            };
-            seen.and(own.through(inner))
-        })
-    }
     let results = pass.writes.iter().map(|w| w.stage).chain([pass.stages.len() - 1]);
-    results.map(|s| of_stage(pass, &pass.stages[s], read)).fold(Look::Around([0, 0]), Look::and)
+    // What drives a parameter is read by no port.
+    results.filter_map(|s| look_of(pass, &pass.stages[s], read)).reduce(Look::and).unwrap_or(Look::Around([0, 0]))
 }
 
-/// Whether a stage asks for a read, itself or through others.
-fn reads(pass: &KernelPass, stage: usize, read: usize) -> bool {
-    pass.stages[stage].ports.iter().any(|p| match p.source {
-        Source::Read(r) => r == read,
-        Source::Stage(k) => reads(pass, k, read),
-    })
+/// The same for one stage; `None` where it does not look there.
+fn look_of(pass: &KernelPass, stage: &Stage, read: usize) -> Option<Look> {
+    let ports = stage.ports.iter().filter_map(|port| {
+        let inner = match port.source {
+            Source::Read(r) => (r == read).then_some(Look::Around([0, 0])),
+            Source::Stage(k) => look_of(pass, &pass.stages[k], read),
+        }?;
+        let wraps = |x: u32, y: u32| port.border == Border::Repeat && (x, y) != (0, 0);
+        let own = match port.reach {
+            Reach::Point => Look::Around([0, 0]),
+            // What lies beyond the other edge is never in the window.
+            Reach::Around(x, y) if !wraps(x, y) => Look::Around([x, y]),
+            Reach::Whole if port.once && pass.block().is_some() => Look::Block([0, 0]),
+            Reach::Elsewhere(looks) if port.border != Border::Repeat => Look::Elsewhere(looks, port.border),
+            Reach::Around(..) | Reach::Elsewhere(_) | Reach::Whole => Look::Whole,
+        };
+        Some(own.through(inner))
+    });
+    ports.reduce(Look::and)
 }
 
 /// Whether a pass can make a part of its pixels alone: the size of the whole image where it can.
@@ -114,7 +112,7 @@ pub(super) fn loop_reach(l: &LoopOp) -> Option<Halo> {
             match look(pass, read) {
                 Look::Around(reach) => own = [0, 1].map(|i| own[i].max(before[i].saturating_add(reach[i]))),
                 // Tables and scalars from outside.
-                Look::Whole | Look::Block(_) => {}
+                Look::Whole | Look::Block(_) | Look::Elsewhere(..) => {}
             }
         }
         far.extend(pass.writes.iter().map(|w| (w.resource, own)));

@@ -101,7 +101,7 @@ impl Streams {
     fn widest(&self, ops: &Ops) -> String {
         let schedule = self.cut(ops.clone(), [LEAST; 2]);
         let tilings = schedule.portions.iter().filter_map(Portion::tiling);
-        let held = tilings.flat_map(|t| t.windows.halos.keys()).map(|id| &schedule.ops.resources[id.index()]);
+        let held = tilings.flat_map(|t| t.windows.views.keys()).map(|id| &schedule.ops.resources[id.index()]);
         let widest = held.max_by_key(|r| r.shape.bytes());
         widest.map_or_else(String::new, |r| {
             format!("even for tiles of {LEAST}x{LEAST} `{}` takes {}, since passes look so far around", r.name, human(&r.shape.bytes()))
@@ -122,14 +122,17 @@ impl Streams {
             for h in halved(size[1]) {
                 let schedule = self.cut(ops.clone(), [w, h]);
                 let tilings: Vec<&TilingOp> = schedule.portions.iter().filter_map(Portion::tiling).collect();
-                let held = || tilings.iter().flat_map(|t| t.windows.halos.keys());
+                let held = || tilings.iter().flat_map(|t| t.windows.views.keys());
                 let fits = held().all(|id| match schedule.ops.shape(*id) {
                     Shape::Image(t) => t.size.iter().all(|n| *n <= limits.max_image) && schedule.ops.shape(*id).bytes() <= budget,
                     shape => shape.bytes() <= limits.max_binding_bytes.min(budget),
                 });
                 // What the host holds of a row of tiles, however it is cut along x.
                 let host = tilings.iter().map(|t| {
-                    let row = |b: &Brought| schedule.ops.shape(b.resource).bytes() / u64::from(w.min(size[0])) * u64::from(size[0]);
+                    let row = |b: &Brought| {
+                        let (shape, width) = (schedule.ops.shape(b.resource), t.windows.size_of(b.resource)[0]);
+                        shape.bytes() / u64::from(shape.plane().map_or(1, |held| held[0])) * u64::from(width)
+                    };
                     t.uploads.iter().chain(&t.fetches).map(row).sum::<u64>()
                 });
                 let work = tilings.iter().map(|t| t.work).fold(1.0, f32::max);

@@ -183,7 +183,12 @@ fn hold_for(pass: &KernelPass, ops: &Ops, streamed: &mut BTreeSet<ResourceId>, k
     };
     for (read, id) in pass.reads.iter().enumerate() {
         let other = ops.shape(*id).plane().is_some_and(|own| own != size);
-        if other || look(pass, read) == Look::Whole {
+        let held = match look(pass, read) {
+            Look::Around(_) | Look::Block(_) => other,
+            Look::Elsewhere(..) => false,
+            Look::Whole => true,
+        };
+        if held {
             keep(streamed, *id, format!("`{}` reads it from anywhere", node(pass, ops)));
         }
     }
