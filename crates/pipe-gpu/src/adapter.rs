@@ -189,10 +189,39 @@ pub(crate) fn limits(adapter: &wgpu::Adapter) -> Limits {
         max_storage_buffers: l.max_storage_buffers_per_shader_stage,
         max_groups: l.max_compute_workgroups_per_dimension,
         half_storage: adapter.features().contains(Features::TEXTURE_ADAPTER_SPECIFIC_FORMAT_FEATURES) && half.into_iter().all(storable),
-        // What a GPU has free, no portable interface tells.
-        budget: if cpu { available_memory() } else { None },
+        budget: if cpu { available_memory() } else { own_memory(adapter).map(|bytes| bytes / 8 * 7) },
         tiled: false,
     }
+}
+
+/// What a GPU's driver lets this process take of the GPU's memory now, or else how much of it there is. Only Vulkan drivers
+/// are asked. Staging buffers and what drivers need themselves come on top of a plan, so not all of it is for plans.
+#[cfg(not(target_vendor = "apple"))]
+fn own_memory(adapter: &wgpu::Adapter) -> Option<u64> {
+    use ash::vk;
+    // SAFETY: the adapter is only asked; nothing of it is kept or destroyed.
+    #[allow(unsafe_code)]
+    let vulkan = unsafe { adapter.as_hal::<wgpu::hal::api::Vulkan>() }?;
+    let mut now = vk::PhysicalDeviceMemoryBudgetPropertiesEXT::default();
+    let mut memory = vk::PhysicalDeviceMemoryProperties2::default();
+    let tells = vulkan.physical_device_capabilities().supports_extension(ash::ext::memory_budget::NAME);
+    if tells {
+        memory = memory.push_next(&mut now);
+    }
+    // SAFETY: the physical device belongs to this instance, which the guard keeps alive. wgpu takes no adapter below
+    // Vulkan 1.1, in which this function is. The chained structure lives as long, and the driver knows its extension.
+    #[allow(unsafe_code)]
+    unsafe {
+        vulkan.shared_instance().raw_instance().get_physical_device_memory_properties2(vulkan.raw_physical_device(), &mut memory);
+    }
+    let heaps = memory.memory_properties.memory_heaps_as_slice().to_vec();
+    let own = heaps.iter().enumerate().filter(|(_, heap)| heap.flags.contains(vk::MemoryHeapFlags::DEVICE_LOCAL));
+    own.map(|(i, heap)| if tells { now.heap_budget[i].min(heap.size) } else { heap.size }).max().filter(|bytes| *bytes > 0)
+}
+
+#[cfg(target_vendor = "apple")]
+fn own_memory(_: &wgpu::Adapter) -> Option<u64> {
+    None
 }
 
 /// Three quarters of the memory that Linux could give away now: decoded files need some too.
