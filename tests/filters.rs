@@ -231,6 +231,51 @@ fn a_median_forgets_single_values_that_are_no_numbers() {
 }
 
 #[test]
+fn what_is_no_number_spreads_no_further_than_a_window() {
+    let mut bench = Bench::new();
+    let size = [90, 70];
+    let inputs = |_: &str| spoiled(size);
+    let both = [Profile::Gpu, Profile::Cpu];
+    for (radius, profile) in [1, 2, 8, 16, 17, 33].into_iter().flat_map(|r| both.map(|p| (r, p))) {
+        let graph = graph(&format!("BoxBlur(image: \"grey\", radius: {radius})"), "out", "Clamp", size);
+        let got = run(&mut bench, &graph, profile, &inputs);
+        let expected = &reference(&graph, &inputs)["out"];
+        let same = |(g, e): (&f64, &f64)| (g - e).abs() < 1e-6 || g == e || g.is_nan() && e.is_nan();
+        assert!(got.iter().zip(expected).all(same), "radius {radius}, {profile:?}");
+    }
+    // The recursive filter spoils what the convolution of the same σ does.
+    for profile in both {
+        let mut spoilt = |method: &str| {
+            let graph = graph(&format!("GaussianBlur(image: \"grey\", sigma: 3.2, method: {method})"), "out", "Mirror", size);
+            run(&mut bench, &graph, profile, &inputs).iter().map(|v| v.is_finite()).collect::<Vec<_>>()
+        };
+        assert!(spoilt("Recursive") == spoilt("Separable"), "{profile:?}");
+    }
+}
+
+/// A pixel of 20,000 on a ramp: nothing of it is left where no window holds it.
+#[test]
+fn a_bright_pixel_leaves_nothing_behind() {
+    let mut bench = Bench::new();
+    let size = [81, 61];
+    let inputs = |_: &str| {
+        Tensor::Image(Raster::from_fn(size, 1, |x, y| [if (x, y) == (40, 30) { 2e4 } else { 0.3 + 0.005 * x as f64 + 0.002 * y as f64 }; 4]))
+    };
+    for (node, reach) in
+        [("BoxBlur(image: \"grey\", radius: 1)", 1), ("BoxBlur(image: \"grey\", radius: 20)", 20), ("Guided(image: \"grey\", radius: 8)", 16)]
+    {
+        let graph = graph(node, "out", "Clamp", size);
+        let expected = &reference(&graph, &inputs)["out"];
+        for profile in [Profile::Gpu, Profile::Cpu] {
+            let got = run(&mut bench, &graph, profile, &inputs);
+            let beyond = |i: &usize| (i % 81).abs_diff(40) > reach || (i / 81).abs_diff(30) > reach;
+            let off = furthest((0..got.len()).filter(beyond).map(|i| (got[i], expected[i])));
+            assert!(off < 2e-5, "{node}, {profile:?}: off by {off:.2e}");
+        }
+    }
+}
+
+#[test]
 fn a_nan_fills_a_morphological_element() {
     let mut bench = Bench::new();
     let size = [40, 30];

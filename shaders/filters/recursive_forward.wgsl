@@ -1,5 +1,7 @@
 // From left to right (or down): two complex one-pole filters, Σ over n ≥ 0 of h(n)·in(x − n).
 
+import package::lib::poison::{Poison, poisoned, antidote, outcome};
+
 fn each(xy: vec2i) {
     let step = select(vec2i(0, 1), vec2i(1, 0), ALONG_X);
     let start = select(vec2i(xy.x, xy.y * RUN), vec2i(xy.x * RUN, xy.y), ALONG_X);
@@ -7,8 +9,11 @@ fn each(xy: vec2i) {
     var a_im = vec4f();
     var b_re = vec4f();
     var b_im = vec4f();
+    var poison = Poison(vec4f(), vec4i(-1));
     for (var i = -WARM; i < RUN; i++) {
-        let v = load_image(start + step * i);
+        let pixel = load_image(start + step * i);
+        poison = poisoned(poison, pixel, RADIUS);
+        let v = antidote(pixel);
         let a = params.pole0.x * a_re - params.pole0.y * a_im + params.gain0.x * v;
         a_im = params.pole0.x * a_im + params.pole0.y * a_re + params.gain0.y * v;
         a_re = a;
@@ -16,7 +21,7 @@ fn each(xy: vec2i) {
         b_im = params.pole1.x * b_im + params.pole1.y * b_re + params.gain1.y * v;
         b_re = b;
         if i >= 0 {
-            store_out(start + step * i, a_re + b_re);
+            store_out(start + step * i, outcome(poison, a_re + b_re));
         }
     }
 }

@@ -5,11 +5,12 @@
 //! coefficients as in P. Getreuer, A Survey of Gaussian Convolution Algorithms, IPOL 3 (2013), K = 4.
 //!
 //! A line is cut into runs. Each run warms its state up over some σ before it, reading through the border policy, so that
-//! all borders are right, runs go in parallel, and a value that is not finite spoils no pixel beyond the next run.
+//! all borders are right, and runs go in parallel. A value that is not finite would stay in the state for ever: it is kept out,
+//! and spoils the pixels within 3σ, as it does where the Gaussian is cut there.
 
 use pipe_graph::prelude::*;
 
-use crate::filters::gaussian::{Axis, both_axes, convolve, wide_weights};
+use crate::filters::gaussian::{Axis, both_axes, convolve, radius, wide_weights};
 use crate::shader;
 
 /// (Re, Im) of α and λ; each stands for itself and its conjugate.
@@ -74,11 +75,12 @@ pub(super) fn recursive_axis(cx: &mut Lowering<'_>, suffix: &str, axis: Axis, si
         let mut pass =
             cx.pass(&format!("{suffix}.{name}"), shader).entry(Entry::Each).grid(Grid::Blocks(block)).read("image", image, reach);
         if backward {
-            pass = pass.read("forward", forward, reach);
+            pass = pass.read("forward", forward, Reach::Point);
         }
         pass.write("out", if backward { out } else { forward })
             .constant("RUN", run as i32)
             .constant("WARM", warm as i32)
+            .constant("RADIUS", radius(sigma) as i32)
             .constant("ALONG_X", along_x)
             .param("pole0", poles[0])
             .param("pole1", poles[1])
