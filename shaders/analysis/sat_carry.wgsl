@@ -1,6 +1,7 @@
 // Carries from tile to tile: for each of LENGTH lines, what the tiles before sum to, for COUNT tiles. Compensated.
 
-import package::lib::wide::sum_error;
+/// Terms that a thread asks for at once, lest it wait for each.
+const AHEAD = 16;
 
 @compute @workgroup_size(64, 1, 1)
 fn main(@builtin(global_invocation_id) id: vec3u) {
@@ -10,10 +11,17 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     }
     var sum = Texel();
     var error = Texel();
-    for (var i = 0; i < COUNT; i++) {
-        put_carried(i * LENGTH + line, sum + error);
-        let term = sums_at(i * LENGTH + line);
-        error += lost_in(sum, term);
-        sum += term;
+    for (var first = 0; first < COUNT; first += AHEAD) {
+        var terms = array<Texel, AHEAD>();
+        for (var n = 0; n < AHEAD; n++) {
+            terms[n] = sums_at(min(first + n, COUNT - 1) * LENGTH + line);
+        }
+        for (var n = 0; n < AHEAD; n++) {
+            if first + n < COUNT {
+                put_carried((first + n) * LENGTH + line, sum + error);
+            }
+            error += lost_in(sum, terms[n]);
+            sum += terms[n];
+        }
     }
 }

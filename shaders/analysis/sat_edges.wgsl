@@ -3,9 +3,20 @@
 // One workgroup a row of tiles. Each thread sums a run of LENGTH/256 columns, the runs are scanned in workgroup
 // memory, then each thread walks its run again.
 
-import package::lib::wide::sum_error;
+/// Terms that a thread asks for at once, lest it wait for each.
+const AHEAD = 16;
 
 var<workgroup> runs: array<Texel, 256>;
+
+/// The terms from `first` on, with nothing from `last` on.
+fn terms_of(row: i32, first: i32, last: i32) -> array<Texel, AHEAD> {
+    var terms = array<Texel, AHEAD>();
+    for (var n = 0; n < AHEAD; n++) {
+        let x = first + n;
+        terms[n] = select(Texel(), above_at(row + min(x, LENGTH - 1)), x < last);
+    }
+    return terms;
+}
 
 @compute @workgroup_size(256, 1, 1)
 fn main(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) lane: u32) {
@@ -14,8 +25,11 @@ fn main(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) la
     let last = min(first + length, LENGTH);
     let row = i32(group.x) * LENGTH;
     var sum = Texel();
-    for (var x = first; x < last; x++) {
-        sum += above_at(row + x);
+    for (var x = first; x < last; x += AHEAD) {
+        var terms = terms_of(row, x, last);
+        for (var n = 0; n < AHEAD; n++) {
+            sum += terms[n];
+        }
     }
     runs[lane] = sum;
     for (var stride = 1u; stride < 256u; stride *= 2u) {
@@ -33,10 +47,14 @@ fn main(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) la
         sum = runs[lane - 1u];
     }
     var error = Texel();
-    for (var x = first; x < last; x++) {
-        let term = above_at(row + x);
-        error += lost_in(sum, term);
-        sum += term;
-        put_edges(row + x, sum + error);
+    for (var x = first; x < last; x += AHEAD) {
+        var terms = terms_of(row, x, last);
+        for (var n = 0; n < AHEAD; n++) {
+            error += lost_in(sum, terms[n]);
+            sum += terms[n];
+            if x + n < last {
+                put_edges(row + x + n, sum + error);
+            }
+        }
     }
 }

@@ -1,8 +1,6 @@
 // The prefix sums of whole lines, one thread a line: rows (AXIS 0) or columns. Compensated. `Texel` stands behind
 // this file.
 
-import package::lib::wide::sum_error;
-
 @compute @workgroup_size(64, 1, 1)
 fn main(@builtin(global_invocation_id) id: vec3u) {
     let size = size_sums();

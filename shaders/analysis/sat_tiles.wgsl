@@ -1,21 +1,25 @@
 // The summed-area table of a tile of SIDE×SIDE pixels, from its pixels, what lies to the left of each of its rows,
 // and the table along its upper edge. `Texel` and the reading of tables stand behind this file.
 //
-// Four threads share a line: each sums a quarter of it in place, then adds what stands at the ends of the quarters
-// before its own. Sums of columns carry what rounding loses.
+// 256 threads share the lines: each holds RUN pixels of one and adds what stands at the ends of the runs before its own.
 
-import package::lib::wide::sum_error;
-
-const QUARTER = SIDE / 4;
-const LANES_Y = SIDE / 4;
+const STEPS = SIDE / 16;
+const RUN = STEPS * STEPS;
 
 var<workgroup> tile: array<Texel, SIDE * SIDE>;
 
+/// Columns are exchanged with the row's number, and every other row's halves: so neither a row, nor a column, nor two rows
+/// of 16 threads meet in one bank of workgroup memory.
 fn cell(x: i32, y: i32) -> i32 {
-    return y * SIDE + (x ^ y);
+    return y * SIDE + (x ^ y ^ ((y & 1) * 16));
 }
 
-@compute @workgroup_size(16, LANES_Y, 1)
+/// The n-th of a thread's pixels when threads form a square.
+fn spread(at: vec2i, n: i32) -> vec2i {
+    return at + 16 * vec2i(n % STEPS, n / STEPS);
+}
+
+@compute @workgroup_size(16, 16, 1)
 fn main(
     @builtin(workgroup_id) group: vec3u,
     @builtin(local_invocation_id) local: vec3u,
@@ -24,71 +28,61 @@ fn main(
     let size = size_image();
     let tile_at = block(group);
     let origin = tile_at * SIDE;
-    for (var y = i32(local.y); y < SIDE; y += LANES_Y) {
-        for (var x = i32(local.x); x < SIDE; x += 16) {
-            let xy = origin + vec2i(x, y);
-            var t = Texel();
-            if all(xy < size) {
-                t = texel_of(load_image(xy));
-            }
-            tile[cell(x, y)] = t;
-        }
+    let at = vec2i(local.xy);
+    let line = i32(lane) % SIDE;
+    let first = i32(lane) / SIDE * RUN;
+    var left = Texel();
+    if origin.y + line < size.y {
+        left = left_at(tile_at.x * size.y + origin.y + line);
+    }
+    var above = Texel();
+    if origin.x + line < size.x {
+        above = edges_at(tile_at.y * size.x + origin.x + line);
+    }
+    var run = array<Texel, RUN>();
+    for (var n = 0; n < RUN; n++) {
+        let xy = origin + spread(at, n);
+        run[n] = select(Texel(), texel_of(load_image(xy)), all(xy < size));
+    }
+    for (var n = 0; n < RUN; n++) {
+        let xy = spread(at, n);
+        tile[cell(xy.x, xy.y)] = run[n];
     }
     workgroupBarrier();
-    let i = i32(lane) % SIDE;
-    let first = i32(lane) / SIDE * QUARTER;
 
     var sum = Texel();
-    for (var x = first; x < first + QUARTER; x++) {
-        sum += tile[cell(x, i)];
-        tile[cell(x, i)] = sum;
+    for (var n = 0; n < RUN; n++) {
+        sum += tile[cell(first + n, line)];
+        run[n] = sum;
+    }
+    tile[cell(first + RUN - 1, line)] = sum;
+    workgroupBarrier();
+    for (var x = RUN - 1; x < first; x += RUN) {
+        left += tile[cell(x, line)];
     }
     workgroupBarrier();
-    var before = Texel();
-    if origin.y + i < size.y {
-        before = left_at(tile_at.x * size.y + origin.y + i);
-    }
-    for (var x = QUARTER - 1; x < first; x += QUARTER) {
-        before += tile[cell(x, i)];
-    }
-    workgroupBarrier();
-    for (var x = first; x < first + QUARTER; x++) {
-        tile[cell(x, i)] += before;
+    for (var n = 0; n < RUN; n++) {
+        tile[cell(first + n, line)] = run[n] + left;
     }
     workgroupBarrier();
 
     sum = Texel();
-    var error = Texel();
-    for (var y = first; y < first + QUARTER; y++) {
-        let term = tile[cell(i, y)];
-        error += lost_in(sum, term);
-        sum += term;
-        tile[cell(i, y)] = sum + error;
+    for (var n = 0; n < RUN; n++) {
+        sum += tile[cell(line, first + n)];
+        run[n] = sum;
+    }
+    tile[cell(line, first + RUN - 1)] = sum;
+    workgroupBarrier();
+    for (var y = RUN - 1; y < first; y += RUN) {
+        above += tile[cell(line, y)];
     }
     workgroupBarrier();
-    before = Texel();
-    if origin.x + i < size.x {
-        before = edges_at(tile_at.y * size.x + origin.x + i);
-    }
-    error = Texel();
-    for (var y = QUARTER - 1; y < first; y += QUARTER) {
-        let term = tile[cell(i, y)];
-        error += lost_in(before, term);
-        before += term;
+    for (var n = 0; n < RUN; n++) {
+        tile[cell(line, first + n)] = run[n] + above;
     }
     workgroupBarrier();
-    for (var y = first; y < first + QUARTER; y++) {
-        let term = tile[cell(i, y)];
-        let lost = lost_in(before, term);
-        tile[cell(i, y)] = before + term + (error + lost);
-    }
-    workgroupBarrier();
-    for (var y = i32(local.y); y < SIDE; y += LANES_Y) {
-        for (var x = i32(local.x); x < SIDE; x += 16) {
-            let xy = origin + vec2i(x, y);
-            if all(xy < size) {
-                store_out(xy, pixel_of(tile[cell(x, y)]));
-            }
-        }
+    for (var n = 0; n < RUN; n++) {
+        let xy = spread(at, n);
+        store_out(origin + xy, pixel_of(tile[cell(xy.x, xy.y)]));
     }
 }

@@ -221,7 +221,7 @@ impl Build<'_> {
         };
         let mut text = format!(
             "alias Texel = {name};\nfn texel_of(v: vec4f) -> Texel {{ return {narrow}; }}\nfn pixel_of(t: Texel) -> vec4f {{ return {widen}; }}\n\
-            fn lost_in(a: Texel, b: Texel) -> Texel {{ return texel_of(sum_error(pixel_of(a), pixel_of(b))); }}\n",
+            fn lost_in(a: Texel, b: Texel) -> Texel {{ return texel_of(package::lib::wide::sum_error(pixel_of(a), pixel_of(b))); }}\n",
         );
         for port in reads {
             let parts: Vec<_> = (0..n).map(|c| format!("load_{port}({n} * i + {c})")).collect();
