@@ -15,9 +15,12 @@ fn curve(v: f32, first: i32, end: i32) -> f32 {
         }
     }
     let d = v - load_knots(5 * low);
-    // Before the first point, and by its coefficients beyond the last, the curve is straight.
-    let bend = select(load_knots(5 * low + 3) + d * load_knots(5 * low + 4), 0.0, d < 0.0);
-    return load_knots(5 * low + 1) + d * (load_knots(5 * low + 2) + d * bend);
+    let slope = load_knots(5 * low + 2);
+    // Before the first point and beyond the last the curve is straight; where it is level, also for infinity.
+    if d < 0.0 || low == end - 1 {
+        return load_knots(5 * low + 1) + select(d * slope, 0.0, slope == 0.0);
+    }
+    return load_knots(5 * low + 1) + d * (slope + d * (load_knots(5 * low + 3) + d * load_knots(5 * low + 4)));
 }
 
 fn apply(image: vec4f) -> vec4f {

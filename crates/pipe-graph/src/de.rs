@@ -283,13 +283,17 @@ impl<'a> TreeDeserializer<'a> {
         }
     }
 
+    /// A whole number; what an expression comes to is rounded down, so that `=in.width/2` serves odd widths too.
     fn integer(self) -> Result<i64, Error> {
+        let span = self.tree.span;
+        let computed = matches!(self.tree.value, Syntax::Text(_));
         let v = self.number()?;
-        let rounded = v.round();
-        if (v - rounded).abs() > 1e-9 || rounded.abs() > 9e15 {
-            return Err(Error::at(self.tree.span, format!("{v} is no whole number"), "expected a whole number"));
+        let nearest = v.round();
+        let whole = (v - nearest).abs() <= 1e-9;
+        if !(whole || computed) || nearest.abs() > 9e15 {
+            return Err(Error::at(span, format!("{v} is no whole number"), "expected a whole number"));
         }
-        Ok(rounded as i64)
+        Ok(if whole { nearest } else { v.floor() } as i64)
     }
 
     /// Notes the edge that a text names.

@@ -226,6 +226,12 @@ pub trait Node: Debug + Send + Sync {
         None
     }
 
+    /// Whether it may make alpha other than 1 from opaque images, other than by a transparent border: such a graph writes
+    /// alpha to its outputs.
+    fn makes_alpha(&self) -> bool {
+        false
+    }
+
     /// Declares passes, and which resource leaves by which port.
     fn lower(&self, cx: &mut Lowering<'_>) -> Result<(), Mistake>;
 
@@ -282,8 +288,6 @@ pub struct Kind {
     pub examples: &'static [&'static str],
     /// Promised agreement with the reference on finite input.
     pub tolerance: Tolerance,
-    /// Whether it may make alpha other than 1 from opaque images: such a graph writes alpha to its outputs.
-    pub sets_alpha: bool,
     /// JSON schema of the fields.
     pub schema: fn() -> Schema,
     /// Reads the fields.
@@ -302,7 +306,6 @@ impl Kind {
             ports: &[("out", "the result")],
             examples,
             tolerance: Tolerance::FLOAT,
-            sets_alpha: false,
             schema: || schema_for!(T),
             build: |d| T::deserialize(d).map(|node| Box::new(node) as Box<dyn Node>),
         }
@@ -312,13 +315,6 @@ impl Kind {
     #[must_use]
     pub const fn ports(mut self, ports: &'static [(&'static str, &'static str)]) -> Self {
         self.ports = ports;
-        self
-    }
-
-    /// A kind that may make alpha.
-    #[must_use]
-    pub const fn sets_alpha(mut self) -> Self {
-        self.sets_alpha = true;
         self
     }
 
@@ -333,7 +329,6 @@ impl Kind {
             ports: &[],
             examples,
             tolerance: Tolerance::EXACT,
-            sets_alpha: false,
             schema: || schema_for!(T),
             build: |_| Err(serde::de::Error::custom("the resolver takes this kind apart")),
         }

@@ -75,7 +75,7 @@ pub enum Layout {
 pub enum Channels {
     /// One channel: grey, depth, a mask.
     Y,
-    /// Grey and alpha.
+    /// Grey and alpha; without [`Alpha`], two values of any meaning, which are red and green.
     Ya,
     /// Red, green, blue (or three values of any meaning, such as a normal).
     Rgb,

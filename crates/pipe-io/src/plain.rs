@@ -110,7 +110,12 @@ fn npy_shape<'a>(bytes: &'a [u8], limits: &Limits, extent: Extent) -> Result<(He
     let channels = Channels::of_count(count)
         .ok_or_else(|| Fault::unsupported(format!("{count} channels; an image has 1 to 4, along the last axis")))?;
     limits.check_extent(extent, width as u64, height as u64, (count * array.element.bytes()) as u64)?;
-    Ok((linear(Format::Npy, width, height, channels, sample), array))
+    let mut header = linear(Format::Npy, width, height, channels, sample);
+    if count == 2 {
+        // Vectors, places, states: an array does not say that its second number is alpha, and mostly it is not.
+        (header.alpha, header.metadata.had_alpha) = (Alpha::None, false);
+    }
+    Ok((header, array))
 }
 
 pub(crate) fn npy_header(bytes: &[u8], limits: &Limits) -> Result<Header, Fault> {

@@ -14,7 +14,7 @@ use indexmap::IndexMap;
 use pipe_gpu::{Choice, Device, Executor, Outputs, Prepared, RunOptions};
 use pipe_graph::graph::{Graph, Instance, Work};
 use pipe_graph::node::ReadbackFile;
-use pipe_graph::pass::Limits;
+use pipe_graph::pass::{Border, Limits};
 use pipe_graph::resolve::Request;
 use pipe_graph::types::{EdgeKind, EdgeType, Element, ImageType, VolumeType};
 use pipe_io::mesh::Mesh;
@@ -497,11 +497,14 @@ fn rim(job: &Job, graph: &Graph, inputs: &Inputs, files: &Inputs) -> Result<(Rim
         }
     }
     let all_inputs = || inputs.values().chain(files.values());
-    let first = all_inputs().find_map(|d| match &**d {
-        Decoded::Picture(p) => Some(&p.metadata),
-        Decoded::Distant(d) => Some(&d.header.metadata),
-        Decoded::Volume(_) | Decoded::Table(_) => None,
-    });
+    let metadata = || {
+        all_inputs().filter_map(|d| match &**d {
+            Decoded::Picture(p) => Some(&p.metadata),
+            Decoded::Distant(d) => Some(&d.header.metadata),
+            Decoded::Volume(_) | Decoded::Table(_) => None,
+        })
+    };
+    let first = metadata().next();
     let first_volume = all_inputs().find_map(|d| if let Decoded::Volume(v) = &**d { Some(&v.header) } else { None });
     let mut outputs = Vec::new();
     let named = graph.outputs().map(|(n, v)| (n.to_owned(), v));
@@ -522,7 +525,7 @@ fn rim(job: &Job, graph: &Graph, inputs: &Inputs, files: &Inputs) -> Result<(Rim
         let to = match ty {
             EdgeType::Image(t) => {
                 let target = fits(Target::parse(&file), &name, &ty)?;
-                let alpha = first.is_some_and(|m| m.had_alpha) || sets_alpha(graph);
+                let alpha = metadata().any(|m| m.had_alpha) || sets_alpha(graph);
                 let channels = match (t.channels, alpha) {
                     (1, _) => Channels::Y,
                     (4, true) => Channels::Rgba,
@@ -568,7 +571,8 @@ fn spacing(size: [u32; 3], input: Option<&VolumeHeader>) -> [f32; 3] {
 /// Whether some node of the graph may make alpha other than 1 where the inputs had none.
 fn sets_alpha(graph: &Graph) -> bool {
     let sets = |instance: &Instance| match &instance.work {
-        Work::Node(_) => pipe_nodes::REGISTRY.get(instance.kind).is_some_and(|k| k.sets_alpha),
+        // What lies outside is transparent, and may come in.
+        Work::Node(node) => node.makes_alpha() || instance.options.border == Border::Black,
         Work::Iterate(iteration) => sets_alpha(&iteration.body),
         _ => false,
     };

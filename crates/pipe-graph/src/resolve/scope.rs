@@ -349,7 +349,7 @@ impl Resolver<'_> {
         Entity::Node(Some(self.instance(site, Work::Node(Arc::from(node)), outputs, frame)))
     }
 
-    /// `when: false`: the first input passes through.
+    /// `when: false`: the first input passes through, to every port that is an edge of its type.
     fn bypass(&mut self, site: &Settling, outputs: &[Output]) -> Entity {
         let (Some(first), Some(out)) = (site.inputs.first(), outputs.first()) else {
             if outputs.is_empty() {
@@ -364,7 +364,8 @@ impl Resolver<'_> {
             self.note(site, Mistake::in_field("options.when", format!("cannot be bypassed: its input is {got}, its output {want}")), false);
             return Entity::Node(None);
         }
-        Entity::Node(Some(vec![(out.name.clone(), *first)]))
+        let alike = outputs.iter().filter(|out| out.ty.kind() == ty.kind());
+        Entity::Node(Some(alike.map(|out| (out.name.clone(), *first)).collect()))
     }
 
     fn check_repeat(&mut self, site: &Settling, types: &[EdgeType], outputs: &[Output]) -> bool {

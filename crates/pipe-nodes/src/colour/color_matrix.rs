@@ -29,8 +29,7 @@ pub(super) const KIND: Kind = Kind::of::<ColorMatrix>(
         r#"ColorMatrix(image: "grey", matrix: [[0.393, 0.769, 0.189], [0.349, 0.686, 0.168], [0.272, 0.534, 0.131]])"#,
         r#"ColorMatrix(image: "grey", matrix: [[0.5, 0.25, 0.25], [0, 1, 0], [0.2, 0.2, 0.6]])"#,
     ],
-)
-.sets_alpha();
+);
 
 impl ColorMatrix {
     /// As 4×4.
@@ -63,6 +62,10 @@ impl Node for ColorMatrix {
 
     fn outputs(&self, inputs: &mut Inputs<'_>) -> Result<Vec<Output>, Mistake> {
         tinted(inputs, &self.image, self.tints())
+    }
+
+    fn makes_alpha(&self) -> bool {
+        self.rows()[3] != [0.0, 0.0, 0.0, 1.0]
     }
 
     fn lower(&self, cx: &mut Lowering<'_>) -> Result<(), Mistake> {

@@ -13,7 +13,7 @@ use crate::shader;
 /// Spaces: `srgb` and `rec709` (the same primaries), `rec2020`, `p3` (D65), `acescg`, `aces2065-1`, `xyz` (D65, Y = 1 for
 /// white). `srgb` and `p3` are encoded with the sRGB curve, `rec709` and `rec2020` with that of ITU-R BT.709; put
 /// `linear-` before the name (`linear-srgb`) for linear values; the others are always linear. Curves are odd about 0, so
-/// that negative values survive. The working space is `linear-srgb`. A 1-channel image becomes colour from and to `xyz`.
+/// that negative values survive. The working space is `linear-srgb`, or just `linear`. A 1-channel image becomes colour from and to `xyz`.
 #[derive(Debug, SmartDefault, Serialize, Deserialize, JsonSchema)]
 #[serde(default)]
 pub(super) struct Colorspace {
@@ -70,6 +70,7 @@ impl Space {
             "acescg" => (Some(ACES_AP1), Transfer::Linear),
             "aces2065-1" => (Some(ACES_AP0), Transfer::Linear),
             "xyz" => (None, Transfer::Linear),
+            "linear" => (Some(REC709), Transfer::Linear),
             _ => return None,
         };
         Some(Self { primaries, transfer: if bare.is_some() { Transfer::Linear } else { encoded } })

@@ -48,8 +48,7 @@ pub(super) const KIND: Kind = Kind::of::<Shuffle>(
     Category::Colour,
     &[r#"Shuffle(image: "in", r: B, b: R)"#, r#"Shuffle(image: "in", r: A, g: Zero, b: One, a: R)"#, r#"Shuffle(image: "grey", a: Zero)"#],
 )
-.tolerance(0.0, 0.0)
-.sets_alpha();
+.tolerance(0.0, 0.0);
 
 impl Shuffle {
     /// Whether every channel stays where it is.
@@ -61,6 +60,10 @@ impl Shuffle {
 impl Node for Shuffle {
     fn outputs(&self, inputs: &mut Inputs<'_>) -> Result<Vec<Output>, Mistake> {
         Ok(Output::out(EdgeType::Image(inputs.image(&self.image).with_channels(4))))
+    }
+
+    fn makes_alpha(&self) -> bool {
+        !matches!(self.a, Channel::A | Channel::One)
     }
 
     fn lower(&self, cx: &mut Lowering<'_>) -> Result<(), Mistake> {

@@ -12,7 +12,7 @@ pub(super) fn maximum(a: f64, b: f64) -> f64 {
 
 /// a/b, 0 where b = 0: as oiiotool and GEGL divide images.
 pub(super) fn quotient(a: f64, b: f64) -> f64 {
-    if b == 0.0 { 0.0 } else { a / b }
+    if b == 0.0 && !a.is_nan() { 0.0 } else { a / b }
 }
 
 /// x − y·⌊x/y⌋, exactly: the remainder with the sign of y (as in Python); 0 where y = 0.

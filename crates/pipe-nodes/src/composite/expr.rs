@@ -185,6 +185,10 @@ impl Node for Expr {
         Ok(Output::out(EdgeType::Image(a.with_channels(channels))))
     }
 
+    fn makes_alpha(&self) -> bool {
+        self.alpha.is_some()
+    }
+
     fn lower(&self, cx: &mut Lowering<'_>) -> Result<(), Mistake> {
         let images: Vec<_> = self.images().into_iter().map(|(name, port)| (name, cx.input(&port))).collect();
         let out = cx.output("out");

@@ -7,7 +7,7 @@ use super::arithmetic::{maximum, minimum, modulo, power, quotient};
 use crate::shader;
 
 /// Joins two images, or an image and a number, by one operation on each colour channel. Alpha is kept: that of `a`,
-/// or of `b` when `a` is a number. Finite pixels give finite results: what has no value in the real numbers is 0.
+/// or of `b` when `a` is a number. What has no value in the real numbers is 0.
 #[derive(Debug, SmartDefault, Serialize, Deserialize, JsonSchema)]
 #[serde(default)]
 pub(crate) struct Math {
@@ -41,7 +41,7 @@ enum Op {
     Abs,
     /// √a; 0 where a < 0.
     Sqrt,
-    /// e^a, at most e^88 (near the largest float).
+    /// e^a, at most e^88 (near the largest float) of what is finite.
     Exp,
     /// ln a; values below the smallest normal float, 2^−126, count as that (−87.3).
     Log,
@@ -91,6 +91,7 @@ impl Op {
             Self::Max => maximum(a, b),
             Self::Abs => a.abs(),
             Self::Sqrt => maximum(a, 0.0).sqrt(),
+            Self::Exp if a == f64::INFINITY => a,
             Self::Exp => minimum(a, 88.0).exp(),
             Self::Log => maximum(a, f64::from(f32::MIN_POSITIVE)).ln(),
             Self::Mod => modulo(a, b),

@@ -86,6 +86,10 @@ impl Node for Pad {
         Ok(Output::out(EdgeType::Image(image.with_size(size))))
     }
 
+    fn makes_alpha(&self) -> bool {
+        self.fill.color().is_some_and(|color| color[3] != 1.0)
+    }
+
     fn lower(&self, cx: &mut Lowering<'_>) -> Result<(), Mistake> {
         let image = cx.input(&self.image);
         // Of the same size: nothing was added.

@@ -127,6 +127,10 @@ impl Node for Resize {
         Ok(Output::out(EdgeType::Image(image.with_size(self.placement(image.size)?.out))))
     }
 
+    fn makes_alpha(&self) -> bool {
+        self.fit == Fit::Letterbox
+    }
+
     fn lower(&self, cx: &mut Lowering<'_>) -> Result<(), Mistake> {
         let image = cx.input(&self.image);
         let to = self.placement(cx.image_type(&self.image).size)?;

@@ -86,6 +86,10 @@ impl Node for SampleImage {
         Ok(Output::out(EdgeType::Image(ImageType { size: coords.size, channels, precision })))
     }
 
+    fn makes_alpha(&self) -> bool {
+        matches!(self.address, Address::ClampToBorder)
+    }
+
     fn lower(&self, cx: &mut Lowering<'_>) -> Result<(), Mistake> {
         let (image, coords, out) = (cx.input(&self.image), cx.input(&self.coords), cx.output("out"));
         let shader = match cx.shape(image) {

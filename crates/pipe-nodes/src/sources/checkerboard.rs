@@ -32,12 +32,15 @@ pub(super) const KIND: Kind = Kind::of::<Checkerboard>(
     Category::Sources,
     &[r#"Checkerboard(size: (64, 48), cell: 8)"#, r#"Checkerboard(size: (65, 31), cell: 7, a: (1, 0, 0, 1), b: (0, 0, 1, 0))"#],
 )
-.tolerance(0.0, 0.0)
-.sets_alpha();
+.tolerance(0.0, 0.0);
 
 impl Node for Checkerboard {
     fn outputs(&self, _: &mut Inputs<'_>) -> Result<Vec<Output>, Mistake> {
         image(self.size, 4)
+    }
+
+    fn makes_alpha(&self) -> bool {
+        [self.a, self.b].iter().any(|color| color.0[3] != 1.0)
     }
 
     fn lower(&self, cx: &mut Lowering<'_>) -> Result<(), Mistake> {

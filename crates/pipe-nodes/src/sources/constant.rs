@@ -25,12 +25,15 @@ pub(super) const KIND: Kind = Kind::of::<Constant>(
     Category::Sources,
     &[r#"Constant(color: (1.0, 0.5, 0.25, 1.0), size: (64, 48))"#, r#"Constant(color: 0.18, size: 48)"#],
 )
-.tolerance(0.0, 0.0)
-.sets_alpha();
+.tolerance(0.0, 0.0);
 
 impl Node for Constant {
     fn outputs(&self, _: &mut Inputs<'_>) -> Result<Vec<Output>, Mistake> {
         image(self.size, 4)
+    }
+
+    fn makes_alpha(&self) -> bool {
+        self.color.0[3] != 1.0
     }
 
     fn lower(&self, cx: &mut Lowering<'_>) -> Result<(), Mistake> {

@@ -29,8 +29,7 @@ pub(super) const KIND: Kind = Kind::of::<Ramp>(
     "Ramp",
     Category::Sources,
     &[r#"Ramp(size: (64, 48))"#, r#"Ramp(from: (1, 0, 0, 1), to: (0, 2, 1, 0.5), direction: Vertical, size: (7, 33))"#],
-)
-.sets_alpha();
+);
 
 /// An axis.
 #[derive(Debug, Clone, Copy, Default, Serialize, Deserialize, JsonSchema)]
@@ -45,6 +44,10 @@ enum Direction {
 impl Node for Ramp {
     fn outputs(&self, _: &mut Inputs<'_>) -> Result<Vec<Output>, Mistake> {
         image(self.size, 4)
+    }
+
+    fn makes_alpha(&self) -> bool {
+        [self.from, self.to].iter().any(|color| color.0[3] != 1.0)
     }
 
     fn lower(&self, cx: &mut Lowering<'_>) -> Result<(), Mistake> {

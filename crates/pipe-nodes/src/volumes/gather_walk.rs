@@ -56,7 +56,6 @@ pub(super) const KIND: Kind = Kind::of::<GatherWalk>(
         r#"GatherWalk(medium: CloudChamber, light: Point([0.5, 0.95, 0.5]), camera: (eye: (0.5, 0.5, 0.9), fov: 70, size: (5, 6)), phase: Rayleigh, paths: 2, max_bounces: 4, seed: 5)"#,
     ],
 )
-.sets_alpha()
 .ports(&[("out", "radiance in R, G and B, and the opacity of the medium")])
 // The twin walks the same paths. Light falls off from a point by the square of its distance, which enlarges rounding.
 .tolerance(1e-4, 1e-3)
@@ -81,6 +80,10 @@ impl Node for GatherWalk {
 
     fn outputs(&self, _: &mut Inputs<'_>) -> Result<Vec<Output>, Mistake> {
         Ok(Output::out(self.camera.image(4)?))
+    }
+
+    fn makes_alpha(&self) -> bool {
+        true
     }
 
     fn lower(&self, cx: &mut Lowering<'_>) -> Result<(), Mistake> {

@@ -51,8 +51,7 @@ pub(super) const KIND: Kind = Kind::of::<Isosurface>(
     ("depth", "distance from the eye along the ray; 0 where there is no surface"),
     ("normal", "x, y, z of the normal, alpha 1; all 0 where there is no surface"),
 ])
-.tolerance(2e-4, 2e-4)
-.sets_alpha();
+.tolerance(2e-4, 2e-4);
 
 /// Halvings of the last step in search of the surface.
 const HALVINGS: u32 = 16;
@@ -83,6 +82,10 @@ impl Node for Isosurface {
     fn outputs(&self, _: &mut Inputs<'_>) -> Result<Vec<Output>, Mistake> {
         let (colour, depth) = (self.camera.image(4)?, self.camera.image(1)?);
         Ok(vec![Output::new("out", colour), Output::new("depth", depth), Output::new("normal", colour)])
+    }
+
+    fn makes_alpha(&self) -> bool {
+        true
     }
 
     fn lower(&self, cx: &mut Lowering<'_>) -> Result<(), Mistake> {

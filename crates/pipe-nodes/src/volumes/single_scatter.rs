@@ -46,7 +46,6 @@ pub(super) const KIND: Kind = Kind::of::<SingleScatter>(
         r#"SingleScatter(medium: CloudChamber(2), light: Point([0.5, 0.95, 0.5]), camera: (eye: (0.5, 0.5, 0.9), fov: 70, size: (7, 9)), phase: Rayleigh, steps: 60)"#,
     ],
 )
-.sets_alpha()
 .ports(&[("out", "radiance in R, G and B, and the opacity of the medium")])
 .tolerance(1e-5, 1e-4);
 
@@ -62,6 +61,10 @@ impl Node for SingleScatter {
 
     fn outputs(&self, _: &mut Inputs<'_>) -> Result<Vec<Output>, Mistake> {
         Ok(Output::out(self.camera.image(4)?))
+    }
+
+    fn makes_alpha(&self) -> bool {
+        true
     }
 
     fn lower(&self, cx: &mut Lowering<'_>) -> Result<(), Mistake> {

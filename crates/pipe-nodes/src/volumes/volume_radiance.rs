@@ -47,7 +47,6 @@ pub(super) const KIND: Kind = Kind::of::<VolumeRadiance>(
         r#"VolumeRadiance(fluence: "fog", medium: CloudChamber, camera: (eye: (0.5, 0.5, 0.9), fov: 70, size: (7, 9)), steps: 100)"#,
     ],
 )
-.sets_alpha()
 .ports(&[("out", "radiance in R, G and B, and the opacity of the medium")])
 .tolerance(1e-5, 1e-4);
 
@@ -65,6 +64,10 @@ impl Node for VolumeRadiance {
             );
         }
         Ok(Output::out(self.camera.image(4)?))
+    }
+
+    fn makes_alpha(&self) -> bool {
+        true
     }
 
     fn lower(&self, cx: &mut Lowering<'_>) -> Result<(), Mistake> {

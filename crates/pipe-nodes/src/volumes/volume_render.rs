@@ -73,8 +73,7 @@ pub(super) const KIND: Kind = Kind::of::<VolumeRender>(
         r#"VolumeRender(volume: "volume", transfer: "curve", camera: (eye: (2, 1.5, -1), size: (24, 24)))"#,
     ],
 )
-.tolerance(2e-4, 1e-4)
-.sets_alpha();
+.tolerance(2e-4, 1e-4);
 
 /// The step that opacities are meant for, in lengths of the cube.
 const REFERENCE_STEP: f64 = 1.7320508075688772 / 256.0;
@@ -138,6 +137,10 @@ impl Node for VolumeRender {
             }
         }
         Ok(Output::out(self.camera.image(4)?))
+    }
+
+    fn makes_alpha(&self) -> bool {
+        true
     }
 
     fn lower(&self, cx: &mut Lowering<'_>) -> Result<(), Mistake> {
