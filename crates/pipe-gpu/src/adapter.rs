@@ -189,6 +189,8 @@ pub(crate) fn limits(adapter: &wgpu::Adapter) -> Limits {
         max_storage_buffers: l.max_storage_buffers_per_shader_stage,
         max_groups: l.max_compute_workgroups_per_dimension,
         half_storage: adapter.features().contains(Features::TEXTURE_ADAPTER_SPECIFIC_FORMAT_FEATURES) && half.into_iter().all(storable),
+        // What drivers of GPUs say here is less than they give.
+        max_piece: largest_piece(adapter).filter(|_| cpu).unwrap_or(u64::MAX),
         budget: if cpu { available_memory() } else { own_memory(adapter).map(|bytes| bytes / 8 * 7) },
         tiled: false,
     }
@@ -217,6 +219,28 @@ fn own_memory(adapter: &wgpu::Adapter) -> Option<u64> {
     let heaps = memory.memory_properties.memory_heaps_as_slice().to_vec();
     let own = heaps.iter().enumerate().filter(|(_, heap)| heap.flags.contains(vk::MemoryHeapFlags::DEVICE_LOCAL));
     own.map(|(i, heap)| if tells { now.heap_budget[i].min(heap.size) } else { heap.size }).max().filter(|bytes| *bytes > 0)
+}
+
+/// The largest allocation that a Vulkan driver takes.
+#[cfg(not(target_vendor = "apple"))]
+fn largest_piece(adapter: &wgpu::Adapter) -> Option<u64> {
+    use ash::vk;
+    // SAFETY: the adapter is only asked; nothing of it is kept or destroyed.
+    #[allow(unsafe_code)]
+    let vulkan = unsafe { adapter.as_hal::<wgpu::hal::api::Vulkan>() }?;
+    let mut most = vk::PhysicalDeviceMaintenance3Properties::default();
+    let mut properties = vk::PhysicalDeviceProperties2::default().push_next(&mut most);
+    // SAFETY: as above; what is chained is part of Vulkan 1.1.
+    #[allow(unsafe_code)]
+    unsafe {
+        vulkan.shared_instance().raw_instance().get_physical_device_properties2(vulkan.raw_physical_device(), &mut properties);
+    }
+    Some(most.max_memory_allocation_size).filter(|bytes| *bytes > 0)
+}
+
+#[cfg(target_vendor = "apple")]
+fn largest_piece(_: &wgpu::Adapter) -> Option<u64> {
+    None
 }
 
 #[cfg(target_vendor = "apple")]

@@ -74,6 +74,14 @@ pub enum GpuError {
         /// The bound.
         limit: std::time::Duration,
     },
+    /// A loop in a user's shader did not end.
+    #[error(
+        "the loops in the shader of `{node}` did not come to an end within the rounds that a thread has (65,000 on a software renderer, 4,194,304 on a GPU)\n  next: look for an endless loop, or do less in one pass"
+    )]
+    Endless {
+        /// The passes that it may be.
+        node: String,
+    },
     /// The device went away.
     #[error(
         "the device was lost while running `{node}`: {reason}\n  next: run `pipe doctor`; if it happens again, lower the work per pass or try --device cpu"

@@ -254,6 +254,9 @@ impl Executor {
         }
         timings.upload_ms = millis(started);
 
+        if let Some(overrun) = &prepared.overrun {
+            self.device.queue.write_buffer(&overrun.buffer, 0, &[0; 4]);
+        }
         self.histories.recall(&self.device, plan, &prepared.memory);
         let chosen: Vec<&Ready> = prepared.steps.iter().zip(steps).filter(|(_, chosen)| **chosen).map(|(step, _)| step).collect();
         for steps in chosen.chunk_by(|a, b| !matches!(a, Ready::Tiles(_)) && !matches!(b, Ready::Tiles(_))) {
@@ -266,6 +269,7 @@ impl Executor {
                 _ => self.launch(&run, steps.iter().copied(), None, &mut timings)?,
             }
         }
+        self.check_loops(prepared, &patience)?;
         timings.passes_run = chosen.len();
         timings.passes_kept = steps.len() - timings.passes_run;
 
@@ -282,6 +286,16 @@ impl Executor {
         timings.readback_ms += millis(started);
         *prepared.memo.contents.lock().unwrap_or_else(PoisonError::into_inner) = contents;
         Ok(timings)
+    }
+
+    /// An error where a user's shader said that its loops did not come to an end: what it made is wrong.
+    fn check_loops(&mut self, prepared: &Prepared, patience: &Patience<'_>) -> Result<(), GpuError> {
+        let Some(overrun) = &prepared.overrun else { return Ok(()) };
+        let mut endless = false;
+        self.transfer.download(&self.device, &[(&overrun.buffer, 4)], patience, &overrun.passes, &mut |_, _, bytes| {
+            endless |= bytes.iter().any(|byte| *byte != 0);
+        })?;
+        if endless { Err(GpuError::Endless { node: overrun.passes.clone() }) } else { Ok(()) }
     }
 
     /// Records, submits and waits for steps; `groups` are those of a tile's launches, from an id on.
@@ -352,6 +366,7 @@ impl Executor {
         timings.upload_ms += millis(started);
 
         self.launch(run, tiles.body.iter(), Some((tiles.first_id, &tile.groups)), timings)?;
+        self.check_loops(prepared, patience)?;
 
         let started = Instant::now();
         let mut taken: Vec<Vec<u8>> = tile.fetches.iter().map(|to| vec![0; to.bytes() as usize]).collect();

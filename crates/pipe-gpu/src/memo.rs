@@ -125,7 +125,9 @@ impl Reader<'_> {
             if let Binding::Uniform { bytes } = binding {
                 let block = self.plan.uniforms.get(run.uniform_offset as usize..).unwrap_or_default();
                 self.hash.update(&block[..block.len().min(*bytes as usize)]);
-            } else if let Some(slot) = slots.next() {
+            } else if binding.takes_slot()
+                && let Some(slot) = slots.next()
+            {
                 let writes = !matches!(binding, Binding::SampledImage | Binding::SampledVolume | Binding::ReadBuffer);
                 self.slot(*slot, writes);
             }

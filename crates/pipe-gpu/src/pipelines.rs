@@ -137,7 +137,7 @@ fn layout_entry(binding: u32, kind: Binding, launch: Launch) -> wgpu::BindGroupL
             T::StorageTexture { access: StorageTextureAccess::WriteOnly, format: formats::of_volume(t), view_dimension: D::D3 }
         }
         Binding::ReadBuffer => buffer(B::Storage { read_only: true }),
-        Binding::WriteBuffer => buffer(B::Storage { read_only: false }),
+        Binding::WriteBuffer | Binding::Overrun => buffer(B::Storage { read_only: false }),
     };
     let visibility = match launch {
         Launch::Compute => wgpu::ShaderStages::COMPUTE,

@@ -22,7 +22,15 @@ pub struct Prepared {
     /// What launches cost in earlier runs, so that a later frame is cut into submissions well from its start.
     pub(crate) costs: Mutex<Costs>,
     pub(crate) memo: Memo,
+    pub(crate) overrun: Option<Overrun>,
     pipelines: usize,
+}
+
+/// Where users' shaders say that their loops did not come to an end.
+pub(crate) struct Overrun {
+    pub(crate) buffer: wgpu::Buffer,
+    /// The passes that have it bound.
+    pub(crate) passes: String,
 }
 
 /// What makes it possible to leave out parts of a run.
@@ -94,17 +102,25 @@ impl Prepared {
         uniforms: Option<wgpu::Buffer>,
         pipelines: &[Arc<Pipeline>],
     ) -> Result<Self, GpuError> {
-        let mut maker =
-            Maker { device, plan: &plan, memory: &memory, uniforms: uniforms.as_ref(), pipelines, names: Vec::new(), costs: Vec::new() };
+        let mut maker = Maker {
+            device,
+            plan: &plan,
+            memory: &memory,
+            uniforms: uniforms.as_ref(),
+            pipelines,
+            names: Vec::new(),
+            costs: Vec::new(),
+            overrun: None,
+        };
         let mut steps = maker.all(&plan.steps)?;
         for (i, step) in steps.iter_mut().enumerate() {
             if let Ready::Tiles(tiles) = step {
                 tiles.step = i;
             }
         }
-        let Maker { names, costs, .. } = maker;
+        let Maker { names, costs, overrun, .. } = maker;
         let pipelines = pipelines.len();
-        Ok(Self { plan, memory, uniforms, steps, names, costs: Mutex::new(Costs(costs)), memo, pipelines })
+        Ok(Self { plan, memory, uniforms, steps, names, costs: Mutex::new(Costs(costs)), memo, overrun, pipelines })
     }
 }
 
@@ -137,6 +153,7 @@ struct Maker<'a> {
     pipelines: &'a [Arc<Pipeline>],
     names: Vec<String>,
     costs: Vec<f64>,
+    overrun: Option<Overrun>,
 }
 
 fn inconsistent(node: &str, reason: impl Into<String>) -> GpuError {
@@ -179,6 +196,24 @@ impl Maker<'_> {
         Ok(ReadyTiles { clears, body: self.all(&t.body)?, first_id, step: 0 })
     }
 
+    /// One more pass whose loops may not come to an end.
+    fn watch(&mut self, pass: &str) {
+        let device = &self.device.device;
+        let overrun = self.overrun.get_or_insert_with(|| Overrun {
+            buffer: device.create_buffer(&wgpu::BufferDescriptor {
+                label: Some("overrun"),
+                size: 4,
+                usage: wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC | wgpu::BufferUsages::COPY_DST,
+                mapped_at_creation: false,
+            }),
+            passes: String::new(),
+        });
+        if !overrun.passes.split(" or ").any(|known| known == pass) {
+            let or = if overrun.passes.is_empty() { "" } else { " or " };
+            overrun.passes += &format!("{or}{pass}");
+        }
+    }
+
     fn run(&mut self, run: &Run) -> Result<ReadyRun, GpuError> {
         let at = run.kernel.0 as usize;
         let (Some(kernel), Some(pipeline)) = (self.plan.kernels.get(at), self.pipelines.get(at)) else {
@@ -193,10 +228,15 @@ impl Maker<'_> {
                 limit: format!("{most} along each axis"),
             });
         }
+        if kernel.bindings.contains(&Binding::Overrun) {
+            self.watch(&run.name);
+        }
         let mut slots = run.slots.iter();
         let mut entries = Vec::new();
         for (i, binding) in kernel.bindings.iter().enumerate() {
-            let resource = if let Binding::Uniform { bytes } = binding {
+            let resource = if let (Binding::Overrun, Some(overrun)) = (binding, &self.overrun) {
+                overrun.buffer.as_entire_binding()
+            } else if let Binding::Uniform { bytes } = binding {
                 wgpu::BindingResource::Buffer(wgpu::BufferBinding {
                     buffer: self.uniforms.ok_or_else(|| inconsistent(&run.name, "it has a uniform block, the plan has none"))?,
                     offset: run.uniform_offset.into(),

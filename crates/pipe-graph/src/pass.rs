@@ -582,6 +582,8 @@ pub struct Limits {
     pub max_volume: u32,
     /// Largest buffer that a shader can bind, in bytes.
     pub max_binding_bytes: u64,
+    /// Most bytes of anything in one piece.
+    pub max_piece: u64,
     /// Most textures that a kernel may read.
     pub max_sampled_images: u32,
     /// Most textures that a kernel may write.
@@ -607,6 +609,7 @@ impl Default for Limits {
             max_image: 16384,
             max_volume: 2048,
             max_binding_bytes: 1 << 31,
+            max_piece: u64::MAX,
             max_sampled_images: 16,
             max_storage_images: 8,
             max_storage_buffers: 8,

@@ -225,6 +225,9 @@ fn check(ops: &Ops, held: &[Held], slots: &[Slot], limits: &Limits, options: &Op
             Shape::Table { .. } | Shape::Words { .. } | Shape::Pixels { .. } if r.shape.bytes() > limits.max_binding_bytes => {
                 return Err(PlanError::TableTooLarge { name: r.name.clone(), bytes: r.shape.bytes(), most: limits.max_binding_bytes });
             }
+            _ if value.storage.bytes() > limits.max_piece => {
+                return Err(PlanError::PieceTooLarge { name: r.name.clone(), bytes: value.storage.bytes(), most: limits.max_piece });
+            }
             _ => {}
         }
     }

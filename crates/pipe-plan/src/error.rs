@@ -13,6 +13,13 @@ pub enum PlanError {
     /// A table is longer than a shader can bind.
     #[error("`{name}` takes {bytes} bytes, but a shader of this device binds at most {most}\n  next: use fewer entries")]
     TableTooLarge { name: String, bytes: u64, most: u64 },
+    /// Something is larger than the device allocates at once.
+    #[error(
+        "`{name}` takes {}, but the device has no more than {} in one piece\n  next: shrink the image, or use options: (format: F16)",
+        human(bytes),
+        human(most)
+    )]
+    PieceTooLarge { name: String, bytes: u64, most: u64 },
     /// A pass needs more resources at once than the device can bind.
     #[error("`{name}` needs {has} {what} at once, the device has {most}\n  next: split it into several nodes")]
     TooManyBindings { name: String, what: &'static str, has: u32, most: u32 },
@@ -50,7 +57,14 @@ impl PlanError {
 
     /// Whether images made in parts may help.
     pub(crate) const fn is_about_size(&self) -> bool {
-        matches!(self, Self::ImageTooLarge { .. } | Self::TableTooLarge { .. } | Self::TooManyGroups { .. } | Self::Budget { .. })
+        matches!(
+            self,
+            Self::ImageTooLarge { .. }
+                | Self::TableTooLarge { .. }
+                | Self::PieceTooLarge { .. }
+                | Self::TooManyGroups { .. }
+                | Self::Budget { .. }
+        )
     }
 }
 

@@ -79,6 +79,16 @@ pub enum Binding {
     ReadBuffer,
     /// `var<storage, read_write>`
     WriteBuffer,
+    /// A word that a user's shader sets when its loops do not come to an end: `var<storage, read_write> overrun:
+    /// atomic<u32>`. No slot: the executor has it, and looks at it when the work is done.
+    Overrun,
+}
+
+impl Binding {
+    /// Whether a slot is bound to it.
+    pub const fn takes_slot(self) -> bool {
+        !matches!(self, Self::Uniform { .. } | Self::Overrun)
+    }
 }
 
 /// How a kernel is launched.

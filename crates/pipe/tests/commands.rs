@@ -115,6 +115,33 @@ fn an_input_is_overwritten_only_by_force() {
     assert_ne!(fs::read(folder.join("in.exr")).expect("read"), before);
 }
 
+/// Mesa's software renderer ends a thread without a word after 65,535 rounds, a GPU would hang.
+#[test]
+fn a_shader_that_loops_for_ever_ends_in_an_error() {
+    let folder = folder();
+    let graph = |access: &str| {
+        format!(
+            r#"Graph(version: 1, inputs: {{"in": Image}}, nodes: {{"glow": Wgsl(shader: "glow.wgsl", inputs: {{"image": "in"}},
+               outputs: {{"out": Image(like: "image")}}, access: {access})}}, outputs: {{"out": "glow"}})"#
+        )
+    };
+    let shader = |rounds: &str| {
+        format!("var v = 0.0; for (var i = 0; {rounds}; i++) {{ v += 1.0; while v > 1e9 {{ v *= 0.5; }} }} return vec4f(v);")
+    };
+    let write = |access: &str, text: String| {
+        fs::write(folder.path().join("glow.ron"), graph(access)).expect("written");
+        fs::write(folder.path().join("glow.wgsl"), text).expect("written");
+    };
+    for (access, function) in [("Point", "fn apply(image: vec4f) -> vec4f"), ("Around(1)", "fn at(xy: vec2i) -> vec4f")] {
+        write(access, format!("{function} {{ {} }}", shader("v >= 0.0")));
+        fails(folder.path(), &["run", "glow.ron", "in.exr", "out.exr"], 2, "the loops in the shader of `glow");
+        assert!(!files(folder.path()).contains(&"out.exr".to_owned()));
+        write(access, format!("{function} {{ {} }}", shader("i < 40000")));
+        succeeds(folder.path(), &["run", "glow.ron", "in.exr", "out.exr", "--vram", "256KiB"]);
+        fs::remove_file(folder.path().join("out.exr")).expect("it was written");
+    }
+}
+
 #[test]
 fn streams_carry_pictures() {
     let folder = folder();

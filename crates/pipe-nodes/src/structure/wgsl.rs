@@ -2,7 +2,7 @@
 
 use indexmap::IndexMap;
 use pipe_graph::prelude::*;
-use pipe_graph::wgsl::{PortShape, check, common_stubs, defines, port_stub, workgroup_size};
+use pipe_graph::wgsl::{self, LIBRARY, PortShape, Signature, common_stubs, defines, port_stub, workgroup_size};
 use smart_default::SmartDefault;
 
 /// Runs a shader of your own. It is written like the built-in ones: mathematics over ports, no bindings.
@@ -179,6 +179,27 @@ impl Wgsl {
         }
     }
 
+    /// What the shader defines, given the types of its inputs and of its first output.
+    fn signature(&self, inputs: &[EdgeType], output: &EdgeType) -> Option<Signature> {
+        let (at, value): (&'static [&'static str], _) = match port_shape(output) {
+            PortShape::Image => (&["vec2i"], "vec4f"),
+            PortShape::Volume => (&["vec3i"], "vec4f"),
+            PortShape::Floats => (&["i32"], "f32"),
+            PortShape::Uints => (&["i32"], "u32"),
+            PortShape::Scalar => (&["i32"], "vec4f"),
+        };
+        let (entry, name) = self.entry();
+        match entry {
+            Entry::Point => {
+                let images = inputs.iter().filter(|ty| matches!(ty, EdgeType::Image(_))).count();
+                Some(Signature { name, arguments: vec![&["vec4f"]; images], result: Some("vec4f") })
+            }
+            Entry::At => Some(Signature { name, arguments: vec![at], result: Some(value) }),
+            Entry::Each => Some(Signature { name, arguments: vec![&["vec2i", "vec3i", "i32"]], result: None }),
+            _ => None,
+        }
+    }
+
     const fn reach(&self) -> Reach {
         match self.access {
             Access::Point => Reach::Point,
@@ -289,13 +310,18 @@ impl Node for Wgsl {
         for output in &outputs {
             stubs.push_str(&port_stub(&output.name, port_shape(&output.ty), false));
         }
-        check(&shader.path, &shader.source, &stubs, pipe_graph::wgsl::LIBRARY)
+        let types: Vec<EdgeType> = self.inputs.values().map(|port| inputs.ty(port.edge)).collect();
+        let signature = self.signature(&types, &outputs[0].ty);
+        wgsl::check(&shader.path, &shader.source, &stubs, LIBRARY, signature.as_ref())
             .map_err(|message| Mistake::in_field("shader", format!("does not compile:\n{message}")))?;
         Ok(outputs)
     }
 
     fn lower(&self, cx: &mut Lowering<'_>) -> Result<(), Mistake> {
-        let shader = self.source.clone().ok_or_else(|| Mistake::new("was not opened"))?;
+        let mut shader = self.source.clone().ok_or_else(|| Mistake::new("was not opened"))?;
+        if let Some(bounded) = wgsl::bounded(&shader.source) {
+            shader.source = bounded.into();
+        }
         let (entry, _) = self.entry();
         let grid = match (entry, self.groups) {
             (Entry::Kernel, Some(groups)) => Grid::Groups(groups),

@@ -69,6 +69,8 @@ impl Cover {
         let cpu = limits.profile == Profile::Cpu;
         let small = matches!(shape, Shape::Image(t) if t.channels < 4 || t.precision == Precision::F16);
         let (size, each, axis) = match position {
+            // So that what bounds the loops of a thread bounds those of one pixel.
+            "vec2i" if cpu && super::has_bounded_loops(pass) => ([64, 1, 1], 1, 1),
             "vec2i" if cpu => {
                 let columns = elements[0].div_ceil(64);
                 let rows = [8, 4, 2].into_iter().find(|r| columns * elements[1].div_ceil(*r) >= 16).unwrap_or(1);

@@ -20,8 +20,8 @@ mod walk;
 use std::fmt::Write as _;
 
 use indexmap::IndexSet;
-use pipe_graph::pass::{Access, Entry, Grid, Limits, ResourceId, Shape};
-use pipe_graph::wgsl::LIBRARY;
+use pipe_graph::pass::{Access, Entry, Grid, Limits, Profile, ResourceId, Shape};
+use pipe_graph::wgsl::{LIBRARY, is_bounded};
 
 use crate::PlanError;
 use crate::kernel_pass::{KernelPass, Ops, Source, StagePort};
@@ -111,6 +111,16 @@ impl<'a> Composer<'a> {
             resources.push(*id);
             let _ = writeln!(io, "@group(0) @binding({at}) var<storage, read> d{i}: vec4f;");
         }
+        if has_bounded_loops(pass) {
+            let at = bindings.len();
+            bindings.push(Binding::Overrun);
+            let most = most_rounds(self.limits);
+            let _ = writeln!(
+                io,
+                "@group(0) @binding({at}) var<storage, read_write> overrun: atomic<u32>;\nvar<private> rounds: u32;\n\
+                 fn too_long() -> bool {{ rounds += 1u; if rounds <= {most}u {{ return false; }} atomicStore(&overrun, 1u); return true; }}"
+            );
+        }
         if pass.last().entry == Entry::Points {
             // Behind the bindings: the image that is drawn into.
             resources.push(pass.writes[0].resource);
@@ -149,6 +159,9 @@ impl<'a> Composer<'a> {
                     ports::pixels_port(&mut text, &write.port, i, size, in_part(write.resource).is_some());
                 }
                 ports::write_port(&mut text, &write.port, i, shape, write.access);
+            }
+            if is_bounded(&stage.shader.source) {
+                text.push_str("fn pipe_too_long() -> bool { return package::io::too_long(); }\n");
             }
             block.params(&mut text, s, stage, &drivers);
             let size = pass.writes.iter().find(|w| w.stage == s).or(pass.writes.first()).map(|w| index(w.resource, true));
@@ -230,7 +243,7 @@ impl<'a> Composer<'a> {
         let count = |f: fn(&Binding) -> bool| bindings.iter().filter(|b| f(b)).count() as u32;
         let sampled = count(|b| matches!(b, Binding::SampledImage | Binding::SampledVolume));
         let stored = count(|b| matches!(b, Binding::StorageImage(_) | Binding::StorageVolume(_)));
-        let buffers = count(|b| matches!(b, Binding::ReadBuffer | Binding::WriteBuffer));
+        let buffers = count(|b| matches!(b, Binding::ReadBuffer | Binding::WriteBuffer | Binding::Overrun));
         let l = self.limits;
         for (what, has, most) in [
             ("images to read", sampled, l.max_sampled_images),
@@ -247,6 +260,20 @@ impl<'a> Composer<'a> {
     /// Every distinct kernel.
     pub(crate) fn finish(self) -> Vec<Kernel> {
         self.kernels.into_iter().collect()
+    }
+}
+
+/// Whether loops of a user stand in it, which are counted.
+fn has_bounded_loops(pass: &KernelPass) -> bool {
+    pass.stages.iter().any(|stage| is_bounded(&stage.shader.source))
+}
+
+/// Rounds that all loops of a user's shader may make together in a thread. Mesa's software renderer ends a thread without a
+/// word after 65,535; a GPU takes some tenths of a second for these.
+fn most_rounds(limits: &Limits) -> u32 {
+    match limits.profile {
+        Profile::Cpu => 65_000,
+        Profile::Gpu => 1 << 22,
     }
 }
 

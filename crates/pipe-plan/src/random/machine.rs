@@ -231,7 +231,7 @@ impl<'a> Machine<'a> {
     fn check_bindings(&self, run: &Run) -> Result<(), String> {
         let kernel = &self.plan.kernels[run.kernel.0 as usize];
         let storage = |slot: SlotId| self.plan.slots[slot.0 as usize].storage;
-        let bindings: Vec<Binding> = kernel.bindings.iter().copied().filter(|b| !matches!(b, Binding::Uniform { .. })).collect();
+        let bindings: Vec<Binding> = kernel.bindings.iter().copied().filter(|b| b.takes_slot()).collect();
         let target = usize::from(matches!(kernel.launch, Launch::Points(_)));
         if run.slots.len() != bindings.len() + target {
             return Err(format!("{} binds {} slots, its kernel {}", run.name, run.slots.len(), bindings.len()));

@@ -123,9 +123,10 @@ impl Streams {
                 let schedule = self.cut(ops.clone(), [w, h]);
                 let tilings: Vec<&TilingOp> = schedule.portions.iter().filter_map(Portion::tiling).collect();
                 let held = || tilings.iter().flat_map(|t| t.windows.views.keys());
+                let most = limits.max_piece.min(budget);
                 let fits = held().all(|id| match schedule.ops.shape(*id) {
-                    Shape::Image(t) => t.size.iter().all(|n| *n <= limits.max_image) && schedule.ops.shape(*id).bytes() <= budget,
-                    shape => shape.bytes() <= limits.max_binding_bytes.min(budget),
+                    Shape::Image(t) => t.size.iter().all(|n| *n <= limits.max_image) && schedule.ops.shape(*id).bytes() <= most,
+                    shape => shape.bytes() <= limits.max_binding_bytes.min(most),
                 });
                 // What the host holds of a row of tiles, however it is cut along x.
                 let host = tilings.iter().map(|t| {

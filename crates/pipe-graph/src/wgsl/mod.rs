@@ -4,8 +4,15 @@
 //! shared library. Because all of that comes behind the user's text, every place that naga names in the text is the
 //! user's own.
 
+mod rules;
+mod tokens;
+
 use std::fmt::Write as _;
 use std::panic::{AssertUnwindSafe, catch_unwind};
+
+pub use rules::Signature;
+use tokens::TOO_LONG;
+pub use tokens::bounded;
 
 /// The shared functions of `shaders/lib`, by module name.
 pub const LIBRARY: &[(&str, &str)] = &include!(concat!(env!("OUT_DIR"), "/library.rs"));
@@ -58,7 +65,10 @@ pub fn port_stub(name: &str, shape: PortShape, input: bool) -> String {
 
 /// Stubs of what every shader sees, beside its ports: parameters as (name, WGSL type).
 pub fn common_stubs(params: &[(String, &str)]) -> String {
-    let mut out = String::from("fn pixel() -> vec2i { return vec2i(); }\n");
+    let mut out = format!(
+        "fn pixel() -> vec2i {{ return vec2i(); }}\n\
+         var<private> rounds: u32;\nfn {TOO_LONG}() -> bool {{ rounds += 1u; return rounds > 9u; }}\n"
+    );
     if !params.is_empty() {
         let members: String = params.iter().map(|(name, ty)| format!("{name}: {ty}, ")).collect();
         let _ = writeln!(out, "struct Params {{ {members} }}\nvar<private> params: Params;");
@@ -66,10 +76,19 @@ pub fn common_stubs(params: &[(String, &str)]) -> String {
     out
 }
 
-/// Checks a shader. The error is what a user should read, with `path:line:column` and the line underlined.
-pub fn check(path: &str, text: &str, stubs: &str, library: &[(&str, &str)]) -> Result<(), String> {
+/// Whether a text is one of [`bounded`].
+pub fn is_bounded(text: &str) -> bool {
+    text.contains(TOO_LONG)
+}
+
+/// Checks a shader that defines `signature`. The error is what a user should read, with `path:line:column` and the line
+/// underlined.
+pub fn check(path: &str, text: &str, stubs: &str, library: &[(&str, &str)], signature: Option<&Signature>) -> Result<(), String> {
     if text.len() > MOST_BYTES {
         return Err(format!("{path} has {} bytes; a shader may have at most {MOST_BYTES}", text.len()));
+    }
+    if let Some((message, place)) = tokens::forbidden(text, library) {
+        return Err(explain(path, text, &message, Some(place)));
     }
     let mut whole = blank_imports(text);
     whole.push('\n');
@@ -78,11 +97,13 @@ pub fn check(path: &str, text: &str, stubs: &str, library: &[(&str, &str)]) -> R
         whole.push_str(&blank_imports(module));
         whole.push('\n');
     }
+    let (end, signature) = (text.len(), signature.cloned());
     let parse = move || -> Result<(), (String, Option<std::ops::Range<usize>>)> {
         let module = naga::front::wgsl::parse_str(&whole).map_err(|e| {
             let place = e.labels().next().and_then(|(span, _)| span.to_range());
             (e.message().to_owned(), place)
         })?;
+        rules::check(&module, end, signature.as_ref())?;
         let mut validator = naga::valid::Validator::new(naga::valid::ValidationFlags::all(), naga::valid::Capabilities::all());
         validator.validate(&module).map(|_| ()).map_err(|e| {
             let mut message = e.as_inner().to_string();
@@ -172,17 +193,37 @@ mod tests {
     #[test]
     fn places_are_the_users_own() {
         let text = "// glow\nimport package::lib::color::luminance;\n\nfn apply(image: vec4f) -> vec4f {\n    return image * gian;\n}\n";
-        let error = check("glow.wgsl", text, &common_stubs(&[("gain".into(), "f32")]), &[]).expect_err("gian is unknown");
+        let error = check("glow.wgsl", text, &common_stubs(&[("gain".into(), "f32")]), LIBRARY, None).expect_err("gian is unknown");
         assert!(error.starts_with("glow.wgsl:5:20:"), "{error}");
         assert!(error.contains("^^^^"), "{error}");
         let good = text.replace("gian", "params.gain");
-        assert_eq!(check("glow.wgsl", &good, &common_stubs(&[("gain".into(), "f32")]), &[]), Ok(()));
+        assert_eq!(check("glow.wgsl", &good, &common_stubs(&[("gain".into(), "f32")]), LIBRARY, None), Ok(()));
     }
 
     #[test]
     fn long_chains_do_not_overflow() {
         let text = format!("fn apply(image: vec4f) -> vec4f {{ return image{}; }}", " + image".repeat(20_000));
-        let _ = check("long.wgsl", &text, "", &[]);
+        let _ = check("long.wgsl", &text, "", &[], None);
+    }
+
+    #[test]
+    fn what_is_called_has_the_shape_that_it_is_called_with() {
+        let at = Signature { name: "at", arguments: vec![&["vec2i"]], result: Some("vec4f") };
+        let check = |text: &str| check("a.wgsl", text, &common_stubs(&[]), &[], Some(&at));
+        assert_eq!(check("fn at(xy: vec2<i32>) -> vec4<f32> { return vec4f(); }"), Ok(()));
+        for (text, message) in [
+            ("fn at(xy: vec2u) -> vec4f { return vec4f(); }", "a.wgsl:1:1: `at` is (vec2u) -> vec4f; expected `fn at(xy: vec2i) -> vec4f`"),
+            ("fn at(xy: vec2i) -> f32 { return 0.0; }", "a.wgsl:1:1: `at` is (vec2i) -> f32; expected"),
+            (
+                "@group(0) @binding(0) var t: texture_2d<f32>;\nfn at(xy: vec2i) -> vec4f { return vec4f(); }",
+                "a.wgsl:1:23: `t` is a binding",
+            ),
+            ("fn at(xy: vec2i) -> vec4f { var z: array<vec4f, 2000>; return z[xy.x]; }", "a.wgsl:1:29: `z` takes 32000 bytes"),
+            ("var<workgroup> w: array<f32, 100000000>;\nfn at(xy: vec2i) -> vec4f { return vec4f(w[0]); }", "a.wgsl:1:1: `w` makes it"),
+        ] {
+            let error = check(text).expect_err(text);
+            assert!(error.starts_with(message), "{error}");
+        }
     }
 
     #[test]
