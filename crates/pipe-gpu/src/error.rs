@@ -76,7 +76,7 @@ pub enum GpuError {
     },
     /// A loop in a user's shader did not end.
     #[error(
-        "the loops in the shader of `{node}` did not come to an end within the rounds that a thread has (65,000 on a software renderer, 4,194,304 on a GPU)\n  next: look for an endless loop, or do less in one pass"
+        "the loops in the shader of `{node}` did not come to an end within the rounds that a thread has (32,000 on a software renderer, 4,194,304 on a GPU)\n  next: look for an endless loop, or do less in one pass"
     )]
     Endless {
         /// The passes that it may be.

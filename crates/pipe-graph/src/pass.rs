@@ -73,11 +73,11 @@ impl Shape {
         }
     }
 
-    /// Entries of a table or of what is seen as one; 1 of anything else. No buffer has more than `u32` counts.
+    /// Entries of a table or of what is seen as one; 1 of anything else. No buffer has more than an `i32` counts.
     pub const fn entries(&self) -> u32 {
         match self {
             Self::Table { len, .. } | Self::Words { len } => *len,
-            Self::Pixels { .. } if self.bytes() / 4 > u32::MAX as u64 => u32::MAX,
+            Self::Pixels { .. } if self.bytes() / 4 > i32::MAX as u64 => i32::MAX as u32,
             Self::Pixels { .. } => (self.bytes() / 4) as u32,
             _ => 1,
         }

@@ -134,9 +134,9 @@ fn a_shader_that_loops_for_ever_ends_in_an_error() {
     };
     for (access, function) in [("Point", "fn apply(image: vec4f) -> vec4f"), ("Around(1)", "fn at(xy: vec2i) -> vec4f")] {
         write(access, format!("{function} {{ {} }}", shader("v >= 0.0")));
-        fails(folder.path(), &["run", "glow.ron", "in.exr", "out.exr"], 2, "the loops in the shader of `glow");
+        fails(folder.path(), &["run", "glow.ron", "in.exr", "out.exr"], 2, "the loops in the shader of `");
         assert!(!files(folder.path()).contains(&"out.exr".to_owned()));
-        write(access, format!("{function} {{ {} }}", shader("i < 40000")));
+        write(access, format!("{function} {{ {} }}", shader("i < 10000")));
         succeeds(folder.path(), &["run", "glow.ron", "in.exr", "out.exr", "--vram", "256KiB"]);
         fs::remove_file(folder.path().join("out.exr")).expect("it was written");
     }

@@ -72,11 +72,12 @@ pub fn bounded(text: &str) -> Option<String> {
     let tokens = tokens(text);
     let mut out = String::with_capacity(text.len() + 256);
     let mut copied = 0;
-    for (i, _) in tokens.iter().enumerate().filter(|(_, token)| matches!(token.text, "for" | "while" | "loop")) {
+    for (i, token) in tokens.iter().enumerate().filter(|(_, token)| matches!(token.text, "for" | "while" | "loop")) {
         // No expression has a brace: the next one begins the body.
         let body = tokens[i..].iter().find(|token| token.text == "{")?;
-        out.push_str(&text[copied..=body.at]);
-        out.push_str(&format!(" if {TOO_LONG}() {{ break; }} "));
+        // A loop without a round counts too: some drivers see one.
+        out.push_str(&text[copied..token.at]);
+        out.push_str(&format!("{TOO_LONG}(); {} if {TOO_LONG}() {{ break; }} ", &text[token.at..=body.at]));
         copied = body.at + 1;
     }
     if copied == 0 {

@@ -10,12 +10,12 @@ use smart_default::SmartDefault;
 
 use crate::shader;
 
-/// The longest run whose left parts a thread keeps to itself, which is enough for windows not much longer.
-const fn most_kept(profile: Profile) -> u32 {
+/// The longest run whose left parts a thread keeps to itself (on a GPU in registers), and the radius up to which that is
+/// faster than leaving them to a pass of their own: it loads what all windows of a run hold once for each run.
+const fn kept(profile: Profile, along_x: bool) -> (u32, u32) {
     match profile {
-        // In registers.
-        Profile::Gpu => 16,
-        Profile::Cpu => 32,
+        Profile::Gpu => (16, if along_x { 16 } else { 64 }),
+        Profile::Cpu => (32, 32),
     }
 }
 
@@ -47,9 +47,9 @@ pub(super) const KIND: Kind = Kind::of::<BoxBlur>(
 pub(super) fn box_mean(cx: &mut Lowering<'_>, prefix: &str, r: u32, image: ResourceId, out: ResourceId) {
     let shape = cx.shape(out);
     let rows = cx.intermediate(&format!("{prefix}rows"), shape);
-    let most = most_kept(cx.limits().profile);
     let window = 2 * r + 1;
     for (suffix, along_x, from, to) in [("rows", true, image, rows), ("columns", false, rows, out)] {
+        let (longest, most) = kept(cx.limits().profile, along_x);
         let reach = if along_x { Reach::Around(r, 0) } else { Reach::Around(0, r) };
         let pass = |cx: &mut Lowering<'_>, suffix: &str, shader: Shader, run: u32, left: Option<ResourceId>, to: ResourceId| {
             let block = if along_x { [run, 1] } else { [1, run] };
@@ -61,7 +61,7 @@ pub(super) fn box_mean(cx: &mut Lowering<'_>, prefix: &str, r: u32, image: Resou
             pass.write("out", to).constant("RADIUS", r as i32).constant("RUN", run as i32).constant("ALONG_X", along_x).add();
         };
         if r <= most {
-            pass(cx, suffix, shader!("filters/box_run"), window.min(most), None, to);
+            pass(cx, suffix, shader!("filters/box_run"), window.min(longest), None, to);
         } else {
             let name = format!("{suffix}.left");
             let left = cx.intermediate(&format!("{prefix}{name}"), shape);

@@ -319,10 +319,7 @@ impl Node for Wgsl {
 
     fn lower(&self, cx: &mut Lowering<'_>) -> Result<(), Mistake> {
         let mut shader = self.source.clone().ok_or_else(|| Mistake::new("was not opened"))?;
-        if let Some(bounded) = wgsl::bounded(&shader.source) {
-            shader.source = bounded.into();
-        }
-        let (entry, _) = self.entry();
+        let (mut entry, _) = self.entry();
         let grid = match (entry, self.groups) {
             (Entry::Kernel, Some(groups)) => Grid::Groups(groups),
             (Entry::Kernel, None) => {
@@ -340,6 +337,16 @@ impl Node for Wgsl {
             }
             _ => Grid::Cover,
         };
+        if let Some(mut bounded) = wgsl::bounded(&shader.source) {
+            if entry == Entry::Point && cx.limits().profile == Profile::Cpu {
+                // Fused, a thread would make several pixels, with the rounds of one.
+                let images = self.inputs.iter().filter(|(_, port)| matches!(cx.ty(port.edge), EdgeType::Image(_)));
+                let loads: Vec<String> = images.map(|(name, _)| format!("load_{name}(xy)")).collect();
+                bounded.push_str(&format!("\nfn at(xy: vec2i) -> vec4f {{ return apply({}); }}\n", loads.join(", ")));
+                entry = Entry::At;
+            }
+            shader.source = bounded.into();
+        }
         let inputs: Vec<_> = self.inputs.iter().map(|(name, port)| (name, cx.input(port))).collect();
         let outputs: Vec<_> = self.outputs.keys().map(|name| (name.clone(), cx.output(name))).collect();
         let params: Vec<_> = self.params.iter().map(|(name, p)| (name, p.value(cx))).collect();

@@ -268,11 +268,11 @@ fn has_bounded_loops(pass: &KernelPass) -> bool {
     pass.stages.iter().any(|stage| is_bounded(&stage.shader.source))
 }
 
-/// Rounds that all loops of a user's shader may make together in a thread. Mesa's software renderer ends a thread without a
-/// word after 65,535; a GPU takes some tenths of a second for these.
+/// Rounds that all loops of a user's shader may make together in a thread. Mesa's software renderer ends eight threads
+/// without a word after 65,535 rounds that any of them makes; a GPU takes some tenths of a second for these.
 fn most_rounds(limits: &Limits) -> u32 {
     match limits.profile {
-        Profile::Cpu => 65_000,
+        Profile::Cpu => 32_000,
         Profile::Gpu => 1 << 22,
     }
 }
