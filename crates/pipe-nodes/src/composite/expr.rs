@@ -186,7 +186,7 @@ impl Node for Expr {
     }
 
     fn makes_alpha(&self) -> bool {
-        self.alpha.is_some()
+        self.alpha.as_deref().is_some_and(|alpha| !matches!(alpha.trim(), "1" | "1.0"))
     }
 
     fn lower(&self, cx: &mut Lowering<'_>) -> Result<(), Mistake> {
