@@ -71,13 +71,40 @@ fn frames_moving_pictures_and_streams_go_through_tiles() {
     succeeds(folder, &["compare", "whole.png", "stream.png", "--fail", "0"]);
 }
 
+/// Rows that are wanted last come first in the file, and columns of a turned picture from all of it.
+#[test]
+fn files_are_read_in_the_order_that_turned_tiles_want() {
+    let folder = folder();
+    let folder = folder.path();
+    let turned = r#"Graph(version: 1, inputs: {"in": Image}, outputs: {"turned": "t", "flipped": "f", "small": "s"},
+        nodes: {"t": Rotate90(image: "in"), "c": Crop(image: "in", x: 100, y: 70, width: 301, height: 150), "f": Flip(image: "c"),
+                "s": Resize(image: "in", scale: 0.4)})"#;
+    fs::write(folder.join("turned.ron"), turned).expect("written");
+    succeeds(folder, &["run", "blur.ron", "in.exr", "in.png", "-o", "small=counts.csv"]);
+    succeeds(folder, &["run", "blur.ron", "in.exr", "in.tif", "-o", "small=counts.csv"]);
+    let names = ["turned", "flipped", "small"];
+    for input in ["in.exr", "in.png", "in.tif"] {
+        let outputs = |of: &str| names.map(|name| ["-o".to_owned(), format!("{name}={of}-{name}.exr")]).concat();
+        let run = |of: &str, more: &[&str]| {
+            let outputs = outputs(of);
+            let outputs: Vec<&str> = outputs.iter().map(String::as_str).collect();
+            succeeds(folder, &[&["run", "turned.ron", "-i", &format!("in={input}")] as &[&str], &outputs, more].concat());
+        };
+        run("whole", &[]);
+        run("tiled", &["--vram", "600KiB", "--force"]);
+        for name in names {
+            succeeds(folder, &["compare", &format!("whole-{name}.exr"), &format!("tiled-{name}.exr"), "--fail", "0"]);
+        }
+    }
+}
+
 /// What tiles cannot do is refused with the name of who needs it, before anything is written.
 #[test]
 fn what_does_not_fit_is_refused_by_name() {
     let folder = folder();
     let folder = folder.path();
     let turned = r#"Graph(version: 1, inputs: {"in": Image}, outputs: {"out": "b"},
-        nodes: {"a": Exposure(image: "in", ev: 1), "turned": Rotate90(image: "a"), "b": GaussianBlur(image: "turned", sigma: 2)})"#;
+        nodes: {"a": Exposure(image: "in", ev: 1), "turned": Transform(image: "a", rotate: 20), "b": GaussianBlur(image: "turned", sigma: 2)})"#;
     fs::write(folder.join("turned.ron"), turned).expect("written");
     fs::write(folder.join("out.png"), b"old").expect("written");
     let output = pipe(folder, &["run", "turned.ron", "in.exr", "out.png", "--vram", "1MiB"]);

@@ -19,9 +19,10 @@ mod streams;
 
 use pipe_graph::pass::{Limits, Shape};
 
+use self::look::{Look, look, loop_reach};
 use self::streams::Streams;
 use crate::error::human;
-use crate::kernel_pass::{Brought, Ops, Portion, TilingOp};
+use crate::kernel_pass::{Brought, Op, Ops, Portion, TilingOp};
 use crate::schedule::Schedule;
 use crate::{Options, Plan, PlanError};
 
@@ -55,8 +56,9 @@ pub(crate) fn plan(name: &str, schedule: &Schedule, limits: &Limits, options: &O
         if candidate.work > MOST_WORK {
             let [w, h] = candidate.step;
             reason = Some(format!(
-                "tiles of {w}x{h} would compute {:.1} times the pixels that are wanted, since passes look so far around",
-                candidate.work
+                "tiles of {w}x{h} would compute {:.1} times the pixels that are wanted, since passes look so far around{}",
+                candidate.work,
+                streams.farthest(&schedule.ops)
             ));
             break;
         }
@@ -104,8 +106,31 @@ impl Streams {
         let held = tilings.flat_map(|t| t.windows.views.keys()).map(|id| &schedule.ops.resources[id.index()]);
         let widest = held.max_by_key(|r| r.shape.bytes());
         widest.map_or_else(String::new, |r| {
-            format!("even for tiles of {LEAST}x{LEAST} `{}` takes {}, since passes look so far around", r.name, human(&r.shape.bytes()))
+            format!(
+                "even for tiles of {LEAST}x{LEAST} `{}` takes {}, since passes look so far around{}",
+                r.name,
+                human(&r.shape.bytes()),
+                self.farthest(ops)
+            )
         })
+    }
+
+    /// Who looks farthest around a pixel, as the end of a sentence.
+    fn farthest(&self, ops: &Ops) -> String {
+        let far = |op: &Op| match op {
+            Op::Pass(pass) => {
+                let looks = (0..pass.reads.len()).filter_map(|read| match look(pass, read) {
+                    Look::Around(reach) | Look::Block(reach) => Some(reach),
+                    _ => None,
+                });
+                (looks.flatten().max().unwrap_or(0), pass.nodes.last().copied())
+            }
+            Op::Loop(l) => (loop_reach(l).map_or(0, |halo| halo.before[0].max(halo.before[1])), Some(l.node)),
+        };
+        match self.list.iter().map(far).max_by_key(|(far, _)| *far) {
+            Some((far @ 1.., Some(node))) => format!(": `{}` most, {far} pixels", ops.nodes[node.0 as usize]),
+            _ => String::new(),
+        }
     }
 
     /// Sizes of tiles that may fit, halved again and again from the whole image; how much they overlap.
