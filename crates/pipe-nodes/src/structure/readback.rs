@@ -21,7 +21,8 @@ pub(super) struct Readback {
     region: Option<[u32; 4]>,
     /// Of an image: the channels to write, such as `"rgb"` or `"a"`; all when absent.
     channels: Option<String>,
-    /// Type of the values in an npy file; U32 for tables of counts and F32 otherwise when absent.
+    /// Type of the values in an npy file; U32 for tables of counts and F32 otherwise when absent. U8 and U16 hold 0..1 in
+    /// their whole range, or counts as they are; integers are rounded, and clamped to the type.
     r#type: Option<FileElement>,
 }
 
