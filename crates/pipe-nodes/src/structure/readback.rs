@@ -15,7 +15,7 @@ use crate::shader;
 pub(super) struct Readback {
     /// What to read: a Table, a Scalar or an Image.
     source: In<Any>,
-    /// The file to write; `--stats` alone when absent.
+    /// The file to write; `--stats` alone when absent. With `--frames`, `####` or `%04d` stands for the frame.
     path: String,
     /// Of an image: x, y, width and height of the region, in pixels; all of it when absent.
     region: Option<[u32; 4]>,
