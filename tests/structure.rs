@@ -123,6 +123,32 @@ fn a_bypassed_node_passes_its_input_through() {
 }
 
 #[test]
+fn states_of_simulations_loop_from_an_image_of_four_channels() {
+    let mut bench = Bench::new();
+    for (port, node) in [
+        ("state", "WaveEquation(state: \"s\", steps: 3, dt: 0.2, dx: 1, c2: 1"),
+        ("state", "WaveEquation(state: \"s\", steps: 2, dt: 0.2, dx: 1, c2: 1, integrator: Verlet"),
+        ("state", "WaveStep(state: \"s\", dt: 0.2, dx: 1, c2: 1"),
+        ("image", "ReactionDiffusion(image: \"s\", steps: 3, dt: 0.01"),
+    ] {
+        both_ways(
+            &mut bench,
+            &format!(r#""it": Iterate(state: {{"s": "in"}}, body: {{"w": {node})}}, next: {{"s": "w"}}, count: 2)"#),
+            "it.s",
+        );
+        let outside = node.replace(&format!("{port}: \"s\""), &format!("{port}: \"in\""));
+        both_ways(&mut bench, &format!(r#""w": {outside}, options: (repeat: 2))"#), "w");
+        // Six steps are six steps, wherever the state leaves between them.
+        if node.contains("steps: 3") {
+            let mut run = |nodes: &str| bench.gpu(&graph(nodes, "w"), &input).unwrap_or_else(|e| panic!("{e}"));
+            let (once, twice) = (outside.replace("steps: 3", "steps: 6"), format!(r#""w": {outside}, options: (repeat: 2))"#));
+            close(&run(&twice), &run(&format!(r#""w": {once})"#)), 1e-6, node);
+        }
+        both_ways(&mut bench, &format!(r#""s": Feedback(init: "in", next: "w"), "w": {node})"#), "w");
+    }
+}
+
+#[test]
 fn fused_is_unfused() {
     let mut bench = Bench::new();
     // A chain, a diamond, a tree, a stencil behind points, points behind a stencil, a driven parameter.

@@ -1,4 +1,4 @@
-// The light that arrives at a point when nothing is in its way. LIGHT: 0 a point, 2 a square.
+// The light that arrives at a point when nothing is in its way. LIGHT: 0 a point, 2 a rectangle.
 
 struct Arrival {
     /// Where it comes from, and how far away that is.
@@ -14,9 +14,9 @@ fn arrival(p: vec3f) -> Arrival {
         let distance = max(length(aside), 1e-6);
         return Arrival(-aside / distance, distance, 0.0795774715 / (distance * distance));
     }
-    let area = dot(params.light_right, params.light_right);
+    let squares = vec2f(dot(params.light_right, params.light_right), dot(params.light_up, params.light_up));
     let across = abs(vec2f(dot(aside, params.light_right), dot(aside, params.light_up)));
     let distance = dot(aside, params.light_direction);
-    let lit = all(across <= vec2f(0.5 * area)) && distance > 0.0;
-    return Arrival(-params.light_direction, distance, select(0.0, 1.0 / area, lit));
+    let lit = all(across <= 0.5 * squares) && distance > 0.0;
+    return Arrival(-params.light_direction, distance, select(0.0, inverseSqrt(squares.x) * inverseSqrt(squares.y), lit));
 }

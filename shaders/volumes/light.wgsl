@@ -1,4 +1,4 @@
-// Lights of power 1. LIGHT: 0 a point, 1 a beam, 2 a square with sides light_right and light_up that shines along
+// Lights of power 1. LIGHT: 0 a point, 1 a beam, 2 a rectangle with sides light_right and light_up that shines along
 // light_direction.
 
 /// Where a photon begins, from two numbers in 0..1.

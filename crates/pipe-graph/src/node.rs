@@ -195,7 +195,7 @@ pub enum FileElement {
 pub struct ReadbackFile {
     /// Relative to the working directory; its ending says the format.
     pub path: String,
-    /// Type of the values, where the format can hold it.
+    /// Type of the values of an npy file.
     pub element: Option<FileElement>,
     /// Channels of an image, as positions 0..3; all when empty.
     pub channels: Vec<usize>,

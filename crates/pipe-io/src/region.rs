@@ -94,8 +94,10 @@ pub fn to_json(width: usize, height: usize, channels: usize, samples: Samples<'_
     })
 }
 
-/// Writes a region of `width`×`height` pixels of `channels` samples; the extension of `path` chooses the notation.
-pub fn write(path: &Path, width: usize, height: usize, channels: usize, samples: Samples<'_>) -> Result<()> {
+/// Writes a region of `width`×`height` pixels with a sample for each of the named channels; the extension of `path` chooses the
+/// notation.
+pub fn write(path: &Path, width: usize, height: usize, names: &[&str], samples: Samples<'_>) -> Result<()> {
+    let channels = names.len();
     let notation = Notation::of(path)?;
     if !fills(width, height, channels, samples) {
         let reason = format!("{} samples do not fill {width}×{height} pixels of {channels} channels", samples.len());
@@ -106,11 +108,16 @@ pub fn write(path: &Path, width: usize, height: usize, channels: usize, samples:
             let rows = to_json(width, height, channels, samples).unwrap_or_default();
             format!("{rows}\n").into_bytes()
         }
-        Notation::Csv => csv(width, height, channels, samples).into_bytes(),
+        Notation::Csv => csv(width, height, names, samples).into_bytes(),
         Notation::Npy if channels == 1 => samples.npy(&[height, width]),
         Notation::Npy => samples.npy(&[height, width, channels]),
     };
     save(path, &bytes)
+}
+
+/// Writes samples as a NumPy array of one axis, whatever the extension of `path`.
+pub fn write_array(path: &Path, samples: Samples<'_>) -> Result<()> {
+    save(path, &samples.npy(&[samples.len()]))
 }
 
 fn fills(width: usize, height: usize, channels: usize, samples: Samples<'_>) -> bool {
@@ -118,23 +125,12 @@ fn fills(width: usize, height: usize, channels: usize, samples: Samples<'_>) -> 
     channels > 0 && wanted == Some(samples.len())
 }
 
-fn csv(width: usize, height: usize, channels: usize, samples: Samples<'_>) -> String {
-    let mut text = String::from(match channels {
-        1 => "x,y,value",
-        2 => "x,y,value,a",
-        3 => "x,y,r,g,b",
-        4 => "x,y,r,g,b,a",
-        _ => "x,y",
-    });
-    if channels > 4 {
-        // Writing to a string cannot fail.
-        for channel in 0..channels {
-            let _ = write!(text, ",c{channel}");
-        }
-    }
-    text.push('\n');
+fn csv(width: usize, height: usize, names: &[&str], samples: Samples<'_>) -> String {
+    let channels = names.len();
+    let mut text = format!("x,y,{}\n", names.join(","));
     for y in 0..height {
         for x in 0..width {
+            // Writing to a string cannot fail.
             let _ = write!(text, "{x},{y}");
             for channel in 0..channels {
                 let _ = write!(text, ",{}", samples.text((y * width + x) * channels + channel));
@@ -149,7 +145,7 @@ fn csv(width: usize, height: usize, channels: usize, samples: Samples<'_>) -> St
 mod tests {
     use super::*;
 
-    fn written(name: &str, channels: usize, samples: Samples<'_>) -> Vec<u8> {
+    fn written(name: &str, channels: &[&str], samples: Samples<'_>) -> Vec<u8> {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join(name);
         write(&path, 2, 2, channels, samples).unwrap();
@@ -159,18 +155,36 @@ mod tests {
     #[test]
     fn regions_are_rows_of_pixels() {
         let grey = Samples::F32(&[0.5, f32::NAN, 1.0, -2.0]);
-        assert_eq!(written("r.json", 1, grey), b"[[0.5,\"NaN\"],[1.0,-2.0]]\n");
+        assert_eq!(written("r.json", &["value"], grey), b"[[0.5,\"NaN\"],[1.0,-2.0]]\n");
         let pairs = Samples::U8(&[1, 2, 3, 4, 5, 6, 7, 8]);
-        assert_eq!(written("r.json", 2, pairs), b"[[[1,2],[3,4]],[[5,6],[7,8]]]\n");
-        assert_eq!(written("r.csv", 1, grey), b"x,y,value\n0,0,0.5\n1,0,NaN\n0,1,1.0\n1,1,-2.0\n");
-        let npy = written("r.npy", 2, pairs);
+        assert_eq!(written("r.json", &["r", "g"], pairs), b"[[[1,2],[3,4]],[[5,6],[7,8]]]\n");
+        assert_eq!(written("r.csv", &["value"], grey), b"x,y,value\n0,0,0.5\n1,0,NaN\n0,1,1.0\n1,1,-2.0\n");
+        let npy = written("r.npy", &["r", "g"], pairs);
         assert!(npy.ends_with(&[1, 2, 3, 4, 5, 6, 7, 8]));
         assert!(String::from_utf8_lossy(&npy).contains("'shape': (2, 2, 2)"));
     }
 
     #[test]
+    fn csv_names_the_channels() {
+        let pairs = Samples::U8(&[1, 2, 3, 4, 5, 6, 7, 8]);
+        assert_eq!(written("r.csv", &["b", "a"], pairs), b"x,y,b,a\n0,0,1,2\n1,0,3,4\n0,1,5,6\n1,1,7,8\n");
+    }
+
+    #[test]
+    fn arrays_have_one_axis() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.npy");
+        write_array(&path, Samples::U16(&[1, 2, 3])).unwrap();
+        let npy = std::fs::read(path).unwrap();
+        assert!(
+            npy.ends_with(&[1, 0, 2, 0, 3, 0])
+                && String::from_utf8_lossy(&npy).contains("'descr': '<u2', 'fortran_order': False, 'shape': (3,)")
+        );
+    }
+
+    #[test]
     fn wrong_counts_are_refused() {
-        assert!(write(Path::new("r.csv"), 2, 2, 3, Samples::U8(&[0; 4])).is_err());
-        assert!(write(Path::new("r.csv"), usize::MAX, 2, 3, Samples::U8(&[0; 4])).is_err());
+        assert!(write(Path::new("r.csv"), 2, 2, &["r", "g", "b"], Samples::U8(&[0; 4])).is_err());
+        assert!(write(Path::new("r.csv"), usize::MAX, 2, &["r", "g", "b"], Samples::U8(&[0; 4])).is_err());
     }
 }

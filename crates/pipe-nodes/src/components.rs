@@ -1,4 +1,4 @@
-//! Parameters that are one number for every component, or a number for each: colours, and the sizes of sources.
+//! Parameters that are one number for every component, or a number for each: colours, and the sizes of sources and lights.
 //!
 //! They are read by a visitor of their own and not by an untagged enum, so that each number may be an expression and
 //! each mistake keeps its place.
@@ -24,6 +24,10 @@ pub(crate) struct Rgba(pub(crate) [f32; 4]);
 /// Width and height: `n` for a square, or `(width, height)`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Size(pub(crate) [u32; 2]);
+
+/// Lengths of the sides of a rectangle: `a` for a square, or `(a, b)`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Sides(pub(crate) [f32; 2]);
 
 impl Rgb {
     /// The same number for every channel.
@@ -132,6 +136,16 @@ impl<'de> Deserialize<'de> for Size {
     }
 }
 
+impl<'de> Deserialize<'de> for Sides {
+    fn deserialize<D: Deserializer<'de>>(d: D) -> Result<Self, D::Error> {
+        let expected = "a number or two";
+        match read(d, expected)? {
+            Written::One(a) => Ok(Self([a; 2])),
+            Written::Each(v) => v.as_slice().try_into().map(Self).map_err(|_| wrong_length(v.len(), expected)),
+        }
+    }
+}
+
 impl Serialize for Rgb {
     fn serialize<S: Serializer>(&self, s: S) -> Result<S::Ok, S::Error> {
         if self.is_grey() { self.0[0].serialize(s) } else { self.0.serialize(s) }
@@ -145,6 +159,12 @@ impl Serialize for Rgba {
 }
 
 impl Serialize for Size {
+    fn serialize<S: Serializer>(&self, s: S) -> Result<S::Ok, S::Error> {
+        self.0.serialize(s)
+    }
+}
+
+impl Serialize for Sides {
     fn serialize<S: Serializer>(&self, s: S) -> Result<S::Ok, S::Error> {
         self.0.serialize(s)
     }
@@ -181,4 +201,5 @@ schemas! {
     Rgb "number" [3];
     Rgba "number" [3, 4];
     Size "integer" [2];
+    Sides "number" [2];
 }

@@ -165,7 +165,7 @@ pub fn run_sequence(
                 None => Ok(None),
                 Some(inputs) => {
                     job.frames_before = before;
-                    session.execute(&job, &inputs, Some(cancel), None).map(Some)
+                    session.execute(&job, &inputs, Some(cancel), None)?.at_frame(frame).map(Some)
                 }
             });
             match ran {

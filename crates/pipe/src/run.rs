@@ -18,6 +18,7 @@ use pipe_graph::pass::{Border, Limits};
 use pipe_graph::resolve::Request;
 use pipe_graph::types::{EdgeKind, EdgeType, Element, ImageType, VolumeType};
 use pipe_io::mesh::Mesh;
+use pipe_io::sequence::Pattern;
 use pipe_io::table::Table;
 use pipe_io::volume::{Volume, VolumeHeader, Voxel};
 use pipe_io::{Animation, Channels, Metadata, Picture, ReadOptions, RowWriter, Target, WriteBehind, WriteOptions};
@@ -228,6 +229,16 @@ pub struct Finished {
 }
 
 impl Finished {
+    /// Puts the frame's number into the paths of readbacks; those of outputs have theirs.
+    pub(crate) fn at_frame(mut self, frame: u32) -> Result<Self, Failure> {
+        for (file, _) in &mut self.data {
+            if let Some(pattern) = Pattern::parse(&file.path)? {
+                file.path = pattern.name(frame);
+            }
+        }
+        Ok(self)
+    }
+
     /// Writes every output. Nothing was written before.
     pub fn write(self) -> Result<Report, Failure> {
         self.write_into(&mut HashMap::new())

@@ -332,6 +332,22 @@ fn frames_become_one_moving_picture() {
 }
 
 #[test]
+fn every_frame_has_its_readbacks() {
+    let folder = folder();
+    let folder = folder.path();
+    let graph = r#"Graph(version: 1, nodes: {
+        "grey": Constant(color: "=frame", size: 1, options: (readback: "option.%02d.json")),
+        "many": Readback(source: "grey", path: "many.####.json", channels: "r"),
+        "one": Readback(source: "grey", path: "one.json", channels: "r"),
+    })"#;
+    fs::write(folder.join("counted.ron"), graph).expect("written");
+    succeeds(folder, &["run", "counted.ron", "--frames", "7-8"]);
+    let text = |name: &str| fs::read_to_string(folder.join(name)).unwrap_or_else(|e| panic!("{name}: {e}"));
+    assert_eq!(["many.0007.json", "many.0008.json", "one.json"].map(text), ["[[7.0]]\n", "[[8.0]]\n", "[[8.0]]\n"]);
+    assert_eq!(["option.07.json", "option.08.json", "many.####.json"].map(|name| folder.join(name).exists()), [true, true, false]);
+}
+
+#[test]
 fn frames_that_need_each_other_are_not_resumed() {
     let folder = folder();
     let folder = folder.path();

@@ -3,13 +3,13 @@
 use pipe_graph::prelude::*;
 use smart_default::SmartDefault;
 
-use super::state::widened;
+use super::state::{channels, leave, widened};
 use crate::shader;
 
 /// The Gray–Scott model: ∂U/∂t = Du·∇²U − U·V² + F·(1 − U), ∂V/∂t = Dv·∇²V + U·V² − (F + k)·V, by explicit steps of `dt`
 /// with the 5-point ∇² on pixels of side 1 (Pearson, Complex Patterns in a Simple System, Science 261, 1993). The
-/// result has two channels: R = U, G = V. Patterns need some thousand steps. `options.border` is the rim: `Clamp`
-/// insulates, `Repeat` is periodic.
+/// result has R = U, G = V and as many channels as the image, two at least; of four B = 0, A = 1. Patterns need some thousand
+/// steps. `options.border` is the rim: `Clamp` insulates, `Repeat` is periodic.
 #[derive(Debug, SmartDefault, Serialize, Deserialize, JsonSchema)]
 #[serde(default)]
 pub(crate) struct ReactionDiffusion {
@@ -66,7 +66,8 @@ impl Node for ReactionDiffusion {
                     .hint(format!("expected at most {limit}")),
             );
         }
-        Ok(Output::out(EdgeType::image(inputs.image(&self.image).size, 2)))
+        let image = inputs.image(&self.image);
+        Ok(Output::out(EdgeType::image(image.size, channels(image.channels))))
     }
 
     fn lower(&self, cx: &mut Lowering<'_>) -> Result<(), Mistake> {
@@ -85,7 +86,7 @@ impl Node for ReactionDiffusion {
             state
         };
         if self.steps == 0 {
-            cx.emit("out", state);
+            leave(cx, state, channels(ty.channels));
             return Ok(());
         }
         let shape = cx.shape(state);
@@ -101,7 +102,7 @@ impl Node for ReactionDiffusion {
                 .add();
             Ok(vec![next])
         })?;
-        cx.emit("out", end[0]);
+        leave(cx, end[0], channels(ty.channels));
         Ok(())
     }
 
@@ -123,6 +124,6 @@ impl Node for ReactionDiffusion {
                 [u + dt * du_dt, v + dt * dv_dt, 0.0, 1.0]
             });
         }
-        vec![Tensor::Image(s)]
+        vec![Tensor::Image(Raster { channels: channels(image.channels), ..s })]
     }
 }

@@ -21,6 +21,22 @@ pub(super) fn begin(cx: &mut Lowering<'_>, image: ResourceId) -> ResourceId {
     state
 }
 
+/// Channels of the image in which the state of a node leaves that began with an image of so many: as many, so that loops of
+/// `Iterate`, `Feedback` and `repeat` close; a pair where u alone came in.
+pub(super) fn channels(begun: u8) -> u8 {
+    begun.max(2)
+}
+
+/// Lets a state (u, v) leave by the port `out`, behind zeros in blue and with an alpha of 1 where four channels are to leave.
+pub(super) fn leave(cx: &mut Lowering<'_>, state: ResourceId, channels: u8) {
+    if channels == 2 {
+        cx.emit("out", state);
+        return;
+    }
+    let out = cx.output("out");
+    cx.pass("leave", shader!("simulation/copy")).entry(Entry::Point).read("image", state, Reach::Point).write("out", out).add();
+}
+
 /// An image in 32-bit floats, with its own channels.
 pub(crate) fn widened(cx: &mut Lowering<'_>, image: ResourceId) -> ResourceId {
     let ty = cx.image_of(image);

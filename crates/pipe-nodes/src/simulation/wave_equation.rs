@@ -7,13 +7,13 @@ use smart_default::SmartDefault;
 use super::energy;
 use super::implicit::Solver;
 use super::stability::exceeded_limit;
-use super::state::begin;
+use super::state::{begin, channels, leave};
 use super::wave::{Boundary, Medium, in_blocks};
 use super::wave_twin::{Grid64, step};
 use crate::shader;
 
 /// Solves ∂u/∂t = v, ∂v/∂t = c²∇²u − damping·v for `steps` steps of `dt`, with the 5-point ∇² on a grid of
-/// spacing `dx`. The result has two channels: R = u, G = v.
+/// spacing `dx`. The result has R = u, G = v and as many channels as the state, two at least; of four B = 0, A = 1.
 ///
 /// `Euler`, `Midpoint` and `RungeKutta2` gain energy, `BackwardEuler` loses it; `SymplecticEuler`, `Verlet` and
 /// `CrankNicolson` keep it. A `dt` that an explicit integrator does not bear is a warning that tells the limit.
@@ -92,6 +92,7 @@ pub(crate) const KIND: Kind = Kind::of::<WaveEquation>(
         r#"WaveEquation(state: "in", steps: 3, dt: 2, dx: 1, c2: 1, integrator: CrankNicolson, boundary: Dirichlet)"#,
         r#"WaveEquation(state: "pair", steps: 4, dt: 0.5, dx: 1, c2: 1, integrator: CrankNicolson, boundary: Absorbing, damping: 0.2)"#,
         r#"WaveEquation(state: "pair", steps: 0)"#,
+        r#"WaveEquation(state: "in", steps: 0)"#,
     ],
 )
 .ports(&[("out", "R = u, G = v after the last step"), ("energy", "½∫v² + ½c²∫|∇u|² over the grid, after the last step")])
@@ -196,10 +197,10 @@ impl WaveEquation {
 
 impl Node for WaveEquation {
     fn outputs(&self, inputs: &mut Inputs<'_>) -> Result<Vec<Output>, Mistake> {
-        let size = inputs.image(&self.state).size;
+        let state = inputs.image(&self.state);
         let medium = self.medium();
         if let Some(theta) = self.theta() {
-            let iterations = self.solver(theta, size).iterations;
+            let iterations = self.solver(theta, state.size).iterations;
             if iterations > 1000 {
                 inputs.warn(
                     Mistake::in_field("dt", format!("each step takes {iterations} iterations of the solver"))
@@ -219,7 +220,7 @@ impl Node for WaveEquation {
             let message = format!("{} is beyond the stability limit of `{:?}`, {limit:.6}", self.dt, self.integrator);
             inputs.warn(Mistake::in_field("dt", message).hint(hint));
         }
-        Ok(vec![Output::new("out", EdgeType::image(size, 2)), Output::new("energy", scalar(1))])
+        Ok(vec![Output::new("out", EdgeType::image(state.size, channels(state.channels))), Output::new("energy", scalar(1))])
     }
 
     fn lower(&self, cx: &mut Lowering<'_>) -> Result<(), Mistake> {
@@ -231,7 +232,7 @@ impl Node for WaveEquation {
             (_, _, Some(theta)) => self.implicit(cx, theta, state)?,
             _ => self.stepped(cx, self.steps, state)?,
         };
-        cx.emit("out", end);
+        leave(cx, end, channels(cx.image_of(image).channels));
         let out = cx.output("energy");
         energy::lower(cx, &self.medium(), end, out);
         Ok(())
@@ -247,6 +248,6 @@ impl Node for WaveEquation {
         }
         let energy = grid.energy(&u, &v);
         let pixels = u.into_iter().zip(v).map(|(u, v)| [u, v, 0.0, 1.0]).collect();
-        vec![Tensor::Image(Raster { size: image.size, channels: 2, pixels }), Tensor::Scalar(vec![energy])]
+        vec![Tensor::Image(Raster { size: image.size, channels: channels(image.channels), pixels }), Tensor::Scalar(vec![energy])]
     }
 }

@@ -5,7 +5,8 @@ use pipe_graph::reference::Block;
 
 use crate::shader;
 
-/// An image file, converted to working space like a graph input; `file.exr#layer` names a layer.
+/// An image file, converted to working space like a graph input; `file.exr#layer` names a layer. NPY arrays are numbers, not
+/// pictures: they are linear unless `--in-colorspace` says otherwise, with 8 and 16 bits for 0..1.
 #[derive(Debug, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(default)]
 pub(super) struct ReadImage {

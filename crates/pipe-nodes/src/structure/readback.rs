@@ -15,13 +15,14 @@ use crate::shader;
 pub(super) struct Readback {
     /// What to read: a Table, a Scalar or an Image.
     source: In<Any>,
-    /// The file to write; `--stats` alone when absent.
+    /// The file to write; `--stats` alone when absent. With `--frames`, `####` or `%04d` stands for the frame.
     path: String,
     /// Of an image: x, y, width and height of the region, in pixels; all of it when absent.
     region: Option<[u32; 4]>,
     /// Of an image: the channels to write, such as `"rgb"` or `"a"`; all when absent.
     channels: Option<String>,
-    /// Type of the values in an npy file; U32 for tables of counts and F32 otherwise when absent.
+    /// Type of the values in an npy file; U32 for tables of counts and F32 otherwise when absent. U8 and U16 hold 0..1 in
+    /// their whole range, or counts as they are; integers are rounded, and clamped to the type.
     r#type: Option<FileElement>,
 }
 

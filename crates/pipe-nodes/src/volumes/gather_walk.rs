@@ -25,7 +25,7 @@ pub(super) struct GatherWalk {
     /// `CloudChamber(density_scale)`.
     #[default(medium::homogeneous())]
     medium: Medium,
-    /// Where light comes from: `Point([x, y, z])` or `Plane(origin, normal, size)`.
+    /// Where light comes from: `Point([x, y, z])` or `Plane(origin, normal, size)`, `size` a side or both.
     light: Light,
     /// Where the picture is taken.
     camera: Camera,

@@ -28,7 +28,7 @@ pub(super) struct Isosurface {
     #[default = 256]
     #[schemars(range(min = 1, max = 4096))]
     steps: u32,
-    /// Place of the light, in the space of the camera.
+    /// Place of the light, in the coordinates of the camera's `eye` and `target`.
     #[default([0.3, -2.0, 0.0])]
     light: [f32; 3],
     /// Whether the surface is searched between two samples, or is at the second one.

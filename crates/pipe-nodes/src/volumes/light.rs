@@ -6,6 +6,8 @@ use glam::{DVec3, Vec3};
 use pipe_graph::lowering::PassBuilder;
 use pipe_graph::prelude::*;
 
+use crate::components::Sides;
+
 /// A light of power 1.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub(super) enum Light {
@@ -21,20 +23,20 @@ pub(super) enum Light {
         /// Where it goes; of any length.
         direction: [f32; 3],
     },
-    /// A square that shines straight ahead, everywhere alike.
+    /// A rectangle that shines straight ahead, everywhere alike.
     Plane {
         /// Its middle.
         origin: [f32; 3],
         /// Where its light goes; of any length.
         normal: [f32; 3],
-        /// Length of its sides.
+        /// Length of its sides, or of each: the first lies along x, or along y where the light goes along x.
         #[serde(default = "one")]
-        size: f32,
+        size: Sides,
     },
 }
 
-const fn one() -> f32 {
-    1.0
+const fn one() -> Sides {
+    Sides([1.0; 2])
 }
 
 impl Default for Light {
@@ -49,14 +51,14 @@ impl Light {
     pub(super) fn check(self) -> Result<(), Mistake> {
         let (direction, size) = match self {
             Self::Point { .. } => return Ok(()),
-            Self::Beam { direction, .. } => (direction, 1.0),
-            Self::Plane { normal, size, .. } => (normal, size),
+            Self::Beam { direction, .. } => (direction, [1.0; 2]),
+            Self::Plane { normal, size: Sides(sides), .. } => (normal, sides),
         };
         if direction == [0.0; 3] {
             return Err(Mistake::in_field("light", "its direction is no direction").hint("expected a vector other than 0"));
         }
-        if size <= 0.0 {
-            return Err(Mistake::in_field("light", format!("its size is {size}")).hint("expected a size above 0"));
+        if let Some(side) = size.into_iter().find(|side| *side <= 0.0) {
+            return Err(Mistake::in_field("light", format!("its size is {side}")).hint("expected a size above 0"));
         }
         Ok(())
     }
@@ -84,15 +86,15 @@ impl Light {
     pub(super) fn shape(self) -> Emitter {
         let vector = |v: [f32; 3]| Vec3::from(v).as_dvec3();
         let (origin, direction, size) = match self {
-            Self::Point { position } => (position, [0.0; 3], 0.0),
-            Self::Beam { origin, direction } => (origin, direction, 0.0),
-            Self::Plane { origin, normal, size } => (origin, normal, f64::from(size)),
+            Self::Point { position } => (position, [0.0; 3], [0.0; 2]),
+            Self::Beam { origin, direction } => (origin, direction, [0.0; 2]),
+            Self::Plane { origin, normal, size: Sides(sides) } => (origin, normal, sides.map(f64::from)),
         };
         let direction = vector(direction).normalize_or_zero();
         // Sides along axes where the direction is along an axis.
         let axis = if direction.x.abs() < 0.9 { DVec3::X } else { DVec3::Y };
         let right = (axis - direction * direction.dot(axis)).normalize();
-        Emitter { light: self, origin: vector(origin), direction, sides: [right * size, direction.cross(right) * size] }
+        Emitter { light: self, origin: vector(origin), direction, sides: [right * size[0], direction.cross(right) * size[1]] }
     }
 
     /// Tells a pass what `light.wgsl` asks for.
@@ -135,8 +137,8 @@ impl Emitter {
             let distance = aside.length().max(1e-6);
             return Some(Arrival { towards: -aside / distance, distance, irradiance: 1.0 / (4.0 * PI * distance * distance) });
         }
-        let area = self.sides[0].length_squared();
-        let within = self.sides.iter().all(|side| (aside.dot(*side) / area).abs() <= 0.5);
+        let area = self.sides[0].length() * self.sides[1].length();
+        let within = self.sides.iter().all(|side| (aside.dot(*side) / side.length_squared()).abs() <= 0.5);
         let distance = aside.dot(self.direction);
         (within && distance > 0.0).then_some(Arrival { towards: -self.direction, distance, irradiance: 1.0 / area })
     }
@@ -176,7 +178,7 @@ mod tests {
 
     #[test]
     fn a_plane_shines_on_what_is_before_it() {
-        let light = Light::Plane { origin: [0.5, 1.0, 0.5], normal: [0.0, -2.0, 0.0], size: 0.5 }.shape();
+        let light = Light::Plane { origin: [0.5, 1.0, 0.5], normal: [0.0, -2.0, 0.0], size: Sides([0.5; 2]) }.shape();
         let [origin, direction] = light.emit(0.0, 1.0);
         assert!((origin - DVec3::new(0.25, 1.0, 0.75)).abs().max_element() < 1e-9 || (origin.y - 1.0).abs() < 1e-9);
         assert_eq!(direction, DVec3::NEG_Y);
@@ -184,5 +186,15 @@ mod tests {
         assert_eq!((below.distance, below.irradiance, below.towards), (0.75, 4.0, DVec3::Y));
         assert!(light.at(DVec3::new(0.2, 0.25, 0.5)).is_none(), "beside it");
         assert!(light.at(DVec3::new(0.5, 1.25, 0.5)).is_none(), "behind it");
+    }
+
+    #[test]
+    fn a_plane_may_be_longer_than_wide() {
+        let light = Light::Plane { origin: [0.5, 1.0, 0.5], normal: [0.0, -1.0, 0.0], size: Sides([0.25, 1.0]) }.shape();
+        let lit = |x, z| light.at(DVec3::new(x, 0.5, z)).map(|arrival| arrival.irradiance);
+        assert_eq!([lit(0.5, 0.5), lit(0.4, 0.1), lit(0.6, 0.9)], [Some(4.0); 3]);
+        assert_eq!([lit(0.3, 0.5), lit(0.7, 0.5)], [None; 2]);
+        let [corner, _] = light.emit(0.0, 0.0);
+        assert_eq!((corner - light.origin).abs(), DVec3::new(0.125, 0.0, 0.5));
     }
 }

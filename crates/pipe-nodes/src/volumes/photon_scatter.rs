@@ -51,8 +51,8 @@ pub(super) struct PhotonScatter {
     albedo: f32,
     /// Where light goes when it is scattered.
     phase: Phase,
-    /// Where photons begin: `Point([x, y, z])`, `Beam(origin, direction)` or `Plane(origin, normal, size)`. From outside
-    /// of the cube they travel straight to it; those that miss it have escaped.
+    /// Where photons begin: `Point([x, y, z])`, `Beam(origin, direction)` or `Plane(origin, normal, size)`, `size` a side or
+    /// both. From outside of the cube they travel straight to it; those that miss it have escaped.
     light: Light,
     /// Weight from which on a photon is absorbed as a whole or not at all; 0: never.
     #[default = 0.001]

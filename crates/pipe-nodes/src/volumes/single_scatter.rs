@@ -21,7 +21,7 @@ pub(super) struct SingleScatter {
     /// `CloudChamber(density_scale)`.
     #[default(medium::homogeneous())]
     medium: Medium,
-    /// Where light comes from: `Point([x, y, z])` or `Plane(origin, normal, size)`.
+    /// Where light comes from: `Point([x, y, z])` or `Plane(origin, normal, size)`, `size` a side or both.
     light: Light,
     /// Where the picture is taken.
     camera: Camera,
@@ -42,7 +42,7 @@ pub(super) const KIND: Kind = Kind::of::<SingleScatter>(
     Category::Volumes,
     &[
         r#"SingleScatter(medium: Homogeneous(2), light: Point([0.3, 1.2, 0.4]), camera: (size: (9, 7)), steps: 20)"#,
-        r#"SingleScatter(medium: "fog", light: Plane([0.5, 1, 0.5], [0.2, -1, 0.1], 0.7), camera: (eye: (2, 0.8, 1.5), size: (8, 8)), phase: HenyeyGreenstein(0.6), steps: 64)"#,
+        r#"SingleScatter(medium: "fog", light: Plane([0.5, 1, 0.5], [0.2, -1, 0.1], [0.7, 0.9]), camera: (eye: (2, 0.8, 1.5), size: (8, 8)), phase: HenyeyGreenstein(0.6), steps: 64)"#,
         r#"SingleScatter(medium: CloudChamber(2), light: Point([0.5, 0.95, 0.5]), camera: (eye: (0.5, 0.5, 0.9), fov: 70, size: (7, 9)), phase: Rayleigh, steps: 60)"#,
     ],
 )

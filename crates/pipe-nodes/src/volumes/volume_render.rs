@@ -39,7 +39,7 @@ pub(super) struct VolumeRender {
     /// them it is interpolated, and its colours are not lit.
     #[default(EdgeOr::Value(Transfer::Lecture))]
     transfer: EdgeOr<Table, Transfer>,
-    /// Place of the light, in the space of the camera.
+    /// Place of the light, in the coordinates of the camera's `eye` and `target`.
     #[default([0.3, -2.0, 0.0])]
     light: [f32; 3],
 }
