@@ -115,6 +115,30 @@ fn an_input_is_overwritten_only_by_force() {
     assert_ne!(fs::read(folder.join("in.exr")).expect("read"), before);
 }
 
+/// What never ends is not read to its end.
+#[cfg(unix)]
+#[test]
+fn a_device_is_neither_graph_nor_picture() {
+    let folder = folder();
+    let folder = folder.path();
+    for (node, says) in [
+        ("Subgraph(file: \"/dev/zero\")", "has more than 1048576 bytes"),
+        ("Wgsl(shader: \"/dev/zero\", outputs: {\"out\": Image(size: (2, 2))})", "has more than 16777216 bytes"),
+        ("ReadImage(path: \"/dev/zero\")", "is not a file or a pipe: it is a device"),
+        ("ReadVolume(path: \"/dev/zero\")", "is not a file or a pipe: it is a device"),
+    ] {
+        let graph = format!("Graph(version: 1, nodes: {{\"a\": {node}}}, outputs: {{\"out\": \"a\"}})");
+        fs::write(folder.join("graph.ron"), graph).expect("written");
+        fails(folder, &["check", "graph.ron"], 1, says);
+    }
+    fails(folder, &["check", "/dev/zero"], 1, "expected at most 1048576 bytes");
+    fails(folder, &["run", "tone-map", "/dev/zero", "out.png"], 1, "is not a file or a pipe: it is a device");
+    // A pipe is read once, to its end.
+    let mut child = command(folder, &["run", "tone-map", "/dev/stdin", "out.png"]).stdin(Stdio::piped()).spawn().expect("it starts");
+    child.stdin.take().expect("piped").write_all(&fs::read(folder.join("in.exr")).expect("read")).expect("taken");
+    assert!(child.wait().expect("it ends").success());
+}
+
 #[test]
 fn streams_carry_pictures() {
     let folder = folder();
