@@ -597,7 +597,8 @@ fn readbacks(graph: &Graph) -> Vec<(String, ReadbackFile)> {
     found
 }
 
-fn first_size(graph: &Graph) -> Vec<u32> {
+/// The size of the first input or output that has one.
+pub fn first_size(graph: &Graph) -> Vec<u32> {
     let outputs = graph.outputs().map(|(_, v)| graph.ty(v));
     let mut all = graph.inputs().map(|(_, t)| t).chain(outputs);
     let size = |t: EdgeType| match t {

@@ -216,6 +216,14 @@ fn reports_on_stdout_are_json() {
     for key in ["graph", "size", "passes", "slots", "peak_bytes", "naive_bytes", "bytes_moved"] {
         assert!(!plan[key].is_null(), "plan has no {key}");
     }
+    assert_eq!(plan["size"], serde_json::json!([640, 480]));
+    assert_eq!(json(&["plan", "tone-map", "--size", "640x480", "--after", "allocate", "--json"]), plan);
+    let fused = json(&["plan", "tone-map", "--after", "fuse", "--json"]);
+    assert_eq!((&fused["phase"], fused["passes"].as_array().map(Vec::len)), (&serde_json::json!("fuse"), Some(3)));
+    assert!(fused["decisions"].to_string().contains("is computed inside"), "{fused}");
+    let preset = json(&["presets", "tone-map", "--json"]);
+    assert_eq!(preset["name"], "tone-map");
+    assert!(preset["text"].as_str().is_some_and(|text| text.contains("Graph(")), "{preset}");
     let compared = json(&["compare", "in.exr", "in.exr", "--json"]);
     for key in ["max_abs", "mean_abs", "rms", "flip_mean", "different_percent"] {
         assert_eq!(compared[key].as_f64(), Some(0.0), "compare says {key} = {}", compared[key]);

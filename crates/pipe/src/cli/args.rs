@@ -157,7 +157,7 @@ pub(crate) struct PlanArgs {
     /// Size of the inputs, 1920x1080 unless given.
     #[arg(long, value_name = "WxH")]
     pub(crate) size: Option<String>,
-    /// Show what there is after a phase: lower, prune, fuse, schedule.
+    /// Show what there is after a phase: lower, prune, fuse, schedule, allocate.
     #[arg(long, value_name = "PHASE")]
     pub(crate) after: Option<String>,
     /// As JSON.
