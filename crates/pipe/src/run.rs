@@ -580,7 +580,7 @@ fn sets_alpha(graph: &Graph) -> bool {
 }
 
 /// Readback nodes and options of a graph, by the name that they are fetched by.
-fn readbacks(graph: &Graph) -> Vec<(String, ReadbackFile)> {
+pub fn readbacks(graph: &Graph) -> Vec<(String, ReadbackFile)> {
     let mut found = Vec::new();
     for (_, instance) in graph.iter() {
         let types: Vec<EdgeType> = instance.inputs.iter().map(|v| graph.ty(*v)).collect();
