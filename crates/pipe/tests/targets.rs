@@ -162,3 +162,24 @@ fn a_comparison_overwrites_neither_image() {
         most.as_f64().map(|v| v as f32)
     );
 }
+
+#[test]
+fn every_frame_has_files_of_its_own() {
+    let folder = folder();
+    let folder = folder.path();
+    let frames = |more: &[&'static str]| [&["run", "tone-map", "in.####.exr", "out.##.png", "--frames", "1-2"], more].concat();
+    refused(folder, &frames(&["--dump", "luma=luma.exr"]), "every frame would be written to luma.exr");
+    refused(folder, &frames(&["--dump", "mapped=m.gif"]), "every frame would be written to m.gif");
+    succeeds(folder, &frames(&["--dump", "luma=luma.#.exr", "--stats", "s.##.json", "--trace", "trace.json"]));
+    for name in ["luma.1.exr", "luma.2.exr", "s.01.json", "s.02.json", "trace.json"] {
+        assert!(folder.join(name).is_file(), "{name}");
+    }
+    assert_eq!(json(&fs::read(folder.join("s.01.json")).expect("read"))["size"], serde_json::json!([512, 256]));
+    assert!(!folder.join("s.##.json").exists());
+    // An empty file is no finished frame.
+    fs::write(folder.join("out.01.png"), "").expect("written");
+    fs::write(folder.join("out.02.png"), "finished").expect("written");
+    succeeds(folder, &frames(&["--resume"]));
+    assert!(fs::read(folder.join("out.01.png")).expect("read").starts_with(b"\x89PNG"));
+    assert_eq!(fs::read(folder.join("out.02.png")).expect("read"), b"finished");
+}

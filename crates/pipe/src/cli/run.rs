@@ -1,6 +1,6 @@
 //! `run`: files through a graph, once or for every frame.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
@@ -50,14 +50,14 @@ pub(super) fn run(a: &RunArgs) -> Result<(), Failure> {
                 &|message| {
                     bar.suspend(|| output::say(message));
                 },
-                &|| bar.inc(1),
+                &|frame, report| {
+                    bar.inc(1);
+                    report.map_or(Ok(()), |report| write_reports(a, report, Some(frame)))
+                },
             )?;
             bar.finish_and_clear();
             output::say(&format!("{} frames written, {} skipped", outcome.written, outcome.skipped));
-            if let Some(report) = outcome.last {
-                write_reports(a, &report)?;
-            }
-            Ok(())
+            outcome.last.map_or(Ok(()), |report| write_reports(a, &report, None))
         }
         None => {
             let kinds = input_kinds(&mut project);
@@ -88,7 +88,7 @@ pub(super) fn run(a: &RunArgs) -> Result<(), Failure> {
             if output::verbose() {
                 output::say(&describe(&report));
             }
-            write_reports(a, &report)
+            write_reports(a, &report, None)
         }
     }
 }
@@ -268,17 +268,25 @@ pub(super) fn passes(r: &Report) -> String {
     }
 }
 
-fn write_reports(a: &RunArgs, report: &Report) -> Result<(), Failure> {
-    let save = |path: &PathBuf, value: &serde_json::Value| {
-        let text = serde_json::to_string_pretty(value).unwrap_or_default() + "\n";
+/// Writes the reports that belong to a frame, or with `None` those that belong to the run: in a sequence to its last frame.
+fn write_reports(a: &RunArgs, report: &Report, frame: Option<u32>) -> Result<(), Failure> {
+    let save = |path: &Path, value: &dyn Fn() -> serde_json::Value| {
+        let name = path.to_string_lossy();
+        let pattern = if a.frames.is_some() { Pattern::parse(&name)? } else { None };
+        let path = match (pattern, frame) {
+            (Some(pattern), Some(frame)) => pattern.path(frame),
+            (None, None) => path.to_owned(),
+            _ => return Ok(()),
+        };
+        let text = serde_json::to_string_pretty(&value()).unwrap_or_default() + "\n";
         AtomicFile::write_whole((path.as_os_str() != "-").then_some(path.as_path()), text.as_bytes())
             .map_err(|e| Failure::World(format!("cannot write `{}`: {e}", path.display())))
     };
     if let Some(path) = &a.stats {
-        save(path, &report.to_json())?;
+        save(path, &|| report.to_json())?;
     }
     if let Some(path) = &a.trace {
-        save(path, &trace(report))?;
+        save(path, &|| trace(report))?;
     }
     Ok(())
 }
