@@ -164,7 +164,7 @@ fn reductions_of_one_image_read_it_once() {
             let limits = Limits { profile, ..Limits::default() };
             // Passes over the image, or over the words of its file.
             let readers = |fuse| {
-                let plan = planned(&graph, &limits, fuse).to_json();
+                let plan = planned(&graph, &limits, fuse).to_json(&size);
                 let passes = plan["passes"].as_array().cloned().unwrap_or_default();
                 passes
                     .into_iter()

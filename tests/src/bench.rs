@@ -37,7 +37,7 @@ fn registry() -> Registry {
 pub struct NoFiles;
 
 impl Loader for NoFiles {
-    fn text(&self, path: &Path) -> Result<String, String> {
+    fn text(&self, path: &Path, _: usize) -> Result<String, String> {
         std::fs::read_to_string(path).map_err(|e| format!("{}: {e}", path.display()))
     }
     fn image(&self, path: &Path) -> Result<ImageType, String> {

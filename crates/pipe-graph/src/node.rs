@@ -140,8 +140,9 @@ pub(crate) fn as_table(ty: EdgeType) -> TableType {
 /// What the world outside looks like to the checker: enough to know every size before anything runs.
 /// Paths are already joined to the folder of the file that names them. Errors are sentences for the user.
 pub trait Loader {
-    /// A text file: a graph, a shader, a LUT.
-    fn text(&self, path: &Path) -> Result<String, String>;
+    /// A text file of at most so many bytes: a graph, a shader, a LUT. No more than that is read, for a path may name what never
+    /// ends.
+    fn text(&self, path: &Path, most: usize) -> Result<String, String>;
     /// The type of an image file, from its header.
     fn image(&self, path: &Path) -> Result<ImageType, String>;
     /// The type of a volume file, from its header.

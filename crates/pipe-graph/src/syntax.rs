@@ -18,14 +18,14 @@ use crate::span::{FileId, Span, Spanned, Syntax, Tree};
 /// Deepest nesting of values in one file.
 const MOST_DEPTH: usize = 48;
 
-/// Largest file.
-const MOST_BYTES: usize = 1 << 20;
+/// Largest graph file.
+pub const MOST_BYTES: usize = 1 << 20;
 
 /// Parses a text that is one RON value.
 pub fn parse_tree(text: &str, file: FileId) -> Result<Tree, Diagnostic> {
     if text.len() > MOST_BYTES {
-        return Err(Diagnostic::error(Span::new(file, 0..0), format!("the file has {} bytes", text.len()))
-            .label(format!("expected at most {MOST_BYTES}"))
+        return Err(Diagnostic::error(Span::new(file, 0..0), "the file is too large")
+            .label(format!("expected at most {MOST_BYTES} bytes"))
             .hint("move parts of it into subgraphs"));
     }
     let reader = Reader { text, file };

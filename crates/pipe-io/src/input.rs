@@ -1,13 +1,12 @@
 //! Reading: one door to all decoders.
 
-use std::fs::File;
 use std::io::Read;
 
 use crate::colour::Colorspace;
 use crate::error::{Error, Fault, Result};
 use crate::guard::shielded;
 use crate::picture::{Header, Picture};
-use crate::source::{Format, Limits, Source, load};
+use crate::source::{Format, Limits, Source, load, open};
 use crate::{exr, plain, png, raster, tiff};
 
 /// How to read.
@@ -116,7 +115,7 @@ pub fn probe(source: &Source, options: &ReadOptions) -> Result<Header> {
     const BEGINNING: u64 = 1 << 18;
     if let Some(path) = &source.path {
         let failed = |error| Error::read(source, error);
-        let mut file = File::open(path).map_err(failed)?;
+        let mut file = open(source, path)?;
         let length = file.metadata().map_err(failed)?.len();
         if length > BEGINNING {
             let mut bytes = Vec::new();

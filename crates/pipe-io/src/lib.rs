@@ -33,6 +33,7 @@ mod form;
 mod guard;
 mod icc;
 mod input;
+mod jpeg;
 pub mod mesh;
 mod npy;
 mod output;

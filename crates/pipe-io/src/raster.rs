@@ -14,9 +14,9 @@ use image::{ColorType, ExtendedColorType, ImageDecoder, ImageEncoder, ImageError
 
 use crate::colour::Colour;
 use crate::error::Fault;
-use crate::icc;
 use crate::picture::{Alpha, Channels, Header, Layout, Metadata, Picture, Sample};
 use crate::source::{Format, Limits};
+use crate::{icc, jpeg};
 
 /// Reads the header alone.
 pub(crate) fn header(format: Format, bytes: &[u8], limits: &Limits, profiles: bool) -> Result<Header, Fault> {
@@ -55,6 +55,7 @@ pub(crate) fn decode(format: Format, bytes: &[u8], limits: &Limits, profiles: bo
         Format::Jpeg => {
             let mut decoder = JpegDecoder::new(Cursor::new(bytes)).map_err(fault)?;
             let header = describe(format, &decoder, limits)?;
+            jpeg::check_end(bytes)?;
             let orientation = decoder.orientation().map_err(fault)?;
             let profile = decoder.icc_profile().map_err(fault)?;
             let picture = fill(header, decoder)?;

@@ -60,6 +60,12 @@ impl Pattern {
         format!("{}{frame:0width$}{}", self.before, self.after, width = self.digits)
     }
 
+    /// The frame whose file has this name.
+    pub fn frame(&self, name: &str) -> Option<u32> {
+        let number = name.strip_prefix(&self.before)?.strip_suffix(&self.after)?.parse().ok()?;
+        (self.name(number) == name).then_some(number)
+    }
+
     /// The frames of a range that have no file, in order.
     pub fn missing(&self, frames: FrameRange) -> Vec<u32> {
         let exists = |frame: &u32| {
@@ -94,6 +100,11 @@ impl FrameRange {
     #[allow(clippy::len_without_is_empty)] // no range is empty
     pub const fn len(&self) -> usize {
         ((self.last - self.first) / self.step) as usize + 1
+    }
+
+    /// Whether a frame is one of them.
+    pub const fn contains(&self, frame: u32) -> bool {
+        self.first <= frame && frame <= self.last && (frame - self.first).is_multiple_of(self.step)
     }
 }
 
@@ -152,6 +163,17 @@ mod tests {
     }
 
     #[test]
+    fn a_name_tells_its_frame() {
+        let pattern = Pattern::parse("in.##.exr").unwrap().unwrap();
+        for (name, frame) in
+            [("in.07.exr", Some(7)), ("in.123.exr", Some(123)), ("in.7.exr", None), ("in.007.exr", None), ("in.+7.exr", None)]
+        {
+            assert_eq!(pattern.frame(name), frame, "{name}");
+        }
+        assert_eq!(Pattern::parse("in.#.in").unwrap().unwrap().frame("in.in"), None);
+    }
+
+    #[test]
     fn other_names_are_no_patterns() {
         assert_eq!(Pattern::parse("in.exr").unwrap(), None);
         assert_eq!(Pattern::parse("in.exr#diffuse").unwrap(), None);
@@ -166,6 +188,7 @@ mod tests {
         assert_eq!(frames("7"), [7]);
         assert_eq!(frames("1-4"), [1, 2, 3, 4]);
         assert_eq!(frames("1-10x4"), [1, 5, 9]);
+        assert_eq!((0..12).filter(|n| "1-10x4".parse::<FrameRange>().unwrap().contains(*n)).collect::<Vec<_>>(), [1, 5, 9]);
         assert_eq!("1-10x4".parse::<FrameRange>().unwrap().len(), 3);
         for wrong in ["", "5-1", "1-", "-3", "1-9x0", "a", "+1", "1-99999999999"] {
             assert!(wrong.parse::<FrameRange>().is_err(), "{wrong}");

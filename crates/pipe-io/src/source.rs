@@ -7,7 +7,7 @@
 //! every byte once gains nothing.
 
 use std::fmt;
-use std::fs::File;
+use std::fs::{File, Metadata};
 use std::io::{self, Read};
 use std::path::{Path, PathBuf};
 
@@ -168,7 +168,14 @@ impl Default for Limits {
 impl Limits {
     /// Checks a declared size of which only some is held at once.
     pub(crate) fn check_extent(&self, extent: Extent, width: u64, height: u64, bytes_per_pixel: u64) -> Result<(), Fault> {
-        self.check(width, extent.rows(height), bytes_per_pixel)
+        self.check(width, extent.rows(height), bytes_per_pixel).map_err(|fault| match (fault, extent) {
+            (Fault::TooLarge(_), Extent::Rows) => {
+                let Self { max_pixels, max_bytes } = self;
+                let limits = format!("the limits of {max_pixels} pixels (--max-pixels) and {max_bytes} bytes");
+                Fault::TooLarge(format!("it declares {width}×{height} pixels, of which not even one row is within {limits}"))
+            }
+            (fault, _) => fault,
+        })
     }
 
     /// Checks a declared size; `bytes_per_pixel` over all channels that will be held.
@@ -179,12 +186,12 @@ impl Limits {
         let pixels = u128::from(width) * u128::from(height);
         if pixels > u128::from(self.max_pixels) || width > u64::from(u32::MAX) || height > u64::from(u32::MAX) {
             let max = self.max_pixels;
-            return Err(Fault::TooLarge(format!("it declares {width}×{height} pixels, more than the limit of {max}")));
+            return Err(Fault::TooLarge(format!("it declares {width}×{height} pixels, more than the limit of {max} (--max-pixels)")));
         }
         let bytes = pixels * u128::from(bytes_per_pixel);
         if bytes > u128::from(self.max_bytes) || bytes > isize::MAX as u128 {
             let max = self.max_bytes;
-            return Err(Fault::TooLarge(format!("it declares {bytes} bytes of pixels, more than the limit of {max}")));
+            return Err(Fault::TooLarge(format!("it declares {bytes} bytes of pixels, more than the limit of {max} (--max-pixels)")));
         }
         Ok(())
     }
@@ -263,13 +270,33 @@ impl fmt::Display for Target {
     }
 }
 
+/// Opens what can be read to its end: a file or a pipe.
+pub(crate) fn open(source: &Source, path: &Path) -> Result<File> {
+    let failed = |error: io::Error| Error::read(source, error);
+    if is_device(&std::fs::metadata(path).map_err(failed)?) {
+        return Err(Error::argument(source.to_string(), "a file or a pipe: it is a device"));
+    }
+    File::open(path).map_err(failed)
+}
+
+#[cfg(unix)]
+fn is_device(about: &Metadata) -> bool {
+    use std::os::unix::fs::FileTypeExt;
+    about.file_type().is_char_device() || about.file_type().is_block_device()
+}
+
+#[cfg(not(unix))]
+fn is_device(_: &Metadata) -> bool {
+    false
+}
+
 /// Reads a whole file or stream, at most `limits.max_bytes` of it.
 pub(crate) fn load(source: &Source, limits: &Limits) -> Result<Vec<u8>> {
     let failed = |error: io::Error| Error::read(source, error);
     let mut bytes = Vec::new();
     match &source.path {
         Some(path) => {
-            let file = File::open(path).map_err(failed)?;
+            let file = open(source, path)?;
             let length = file.metadata().map_err(failed)?.len();
             bytes.reserve(length.min(limits.max_bytes) as usize + 1);
             file.take(limits.max_bytes + 1).read_to_end(&mut bytes).map_err(failed)?;

@@ -6,7 +6,7 @@
 use std::path::Path;
 use std::time::{Duration, Instant};
 
-use pipe_io::{ReadOptions, Source, probe, read};
+use pipe_io::{Input, ReadOptions, Source, probe, read};
 
 #[test]
 fn damaged_files_do_no_damage() {
@@ -34,5 +34,22 @@ fn damaged_files_do_no_damage() {
         let peak = status.lines().find_map(|line| line.strip_prefix("VmHWM:"));
         let peak: u64 = peak.and_then(|rest| rest.trim().trim_end_matches(" kB").parse().ok()).unwrap_or(0);
         assert!(peak < 1 << 20, "{peak} kB");
+    }
+}
+
+/// Wherever a JPEG breaks off, it is no picture; what follows its end does not matter.
+#[test]
+fn a_jpeg_is_whole_or_damaged() {
+    for name in ["grey.jpg", "turned.jpg", "progressive.jpg"] {
+        let whole = std::fs::read(Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/fixtures").join(name)).unwrap();
+        let read = |bytes: Vec<u8>| Input::from_bytes(&Source::file(name), bytes, &ReadOptions::default())?.read();
+        for length in 3..whole.len() {
+            let error = read(whole[..length].to_vec()).expect_err(name).to_string();
+            assert!(error.contains(name) && error.contains("is not a valid JPEG file"), "{length}: {error}");
+        }
+        let error = read(whole[..whole.len() - 2].to_vec()).unwrap_err().to_string();
+        assert!(error.contains("it ends before its end marker"), "{error}");
+        let picture = read(whole.clone()).unwrap();
+        assert_eq!(read([whole, b"and a film".to_vec()].concat()).unwrap().bytes, picture.bytes);
     }
 }

@@ -62,7 +62,7 @@ impl Default for Options {
     }
 }
 
-/// A phase whose result `pipe plan --after` shows.
+/// A phase whose result `pipe plan --after` shows. The last one, `allocate`, leaves the plan itself.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Phase {
     /// What the nodes declared.
@@ -84,7 +84,7 @@ impl std::str::FromStr for Phase {
             "prune" => Ok(Self::Prune),
             "fuse" => Ok(Self::Fuse),
             "schedule" => Ok(Self::Schedule),
-            _ => Err(format!("there is no phase `{text}`\n  next: expected lower, prune, fuse or schedule")),
+            _ => Err(format!("there is no phase `{text}`\n  next: expected lower, prune, fuse, schedule or allocate")),
         }
     }
 }

@@ -99,12 +99,6 @@ impl Plan {
         self.lines().len()
     }
 
-    /// The size of the first image, or of the first slot.
-    pub fn size(&self) -> Vec<u64> {
-        let image = self.slots.iter().find(|s| matches!(s.storage, Storage::Image(_)));
-        image.or(self.slots.first()).map(|s| s.storage.extent()).unwrap_or_default()
-    }
-
     /// A table for people.
     pub fn to_text(&self) -> String {
         let mut out = format!("plan of {}\n\npasses\n", self.name);
@@ -153,8 +147,9 @@ impl Plan {
         out
     }
 
-    /// `{graph, size, passes, slots, peak_bytes, naive_bytes, bytes_moved}`; keys as fixed in the design.
-    pub fn to_json(&self) -> Value {
+    /// `{graph, size, passes, slots, peak_bytes, naive_bytes, bytes_moved}`; keys as fixed in the design. A plan knows the sizes of
+    /// its slots, which may hold packed pixels; `size` is what the graph's picture has.
+    pub fn to_json(&self, size: &[u32]) -> Value {
         let pass = |line: &Line<'_>| {
             let run = line.run;
             let mut pass = json!({
@@ -176,7 +171,7 @@ impl Plan {
         let tiling = |t: &Tiling| json!({"name": t.name, "size": t.size, "tile": t.step, "layout": t.layout(), "work": t.work});
         json!({
             "graph": self.name,
-            "size": self.size(),
+            "size": size,
             "passes": self.lines().iter().map(pass).collect::<Vec<_>>(),
             "slots": self.slots.iter().enumerate().map(slot).collect::<Vec<_>>(),
             "tilings": self.tilings().map(tiling).collect::<Vec<_>>(),

@@ -112,10 +112,10 @@ impl Distant {
     /// Bytes of pixels from which on a picture is better read row by row.
     const LARGE: u64 = 1 << 30;
 
-    /// The picture, if it is so large that it is better not held whole: by itself, or beside the budget of a run. A stream,
-    /// which can be read once only, is held anyway.
+    /// The picture, if it is so large that it is better not held whole: by itself, or beside the budget of a run. A stream
+    /// or a pipe, which can be read once only, is held anyway.
     fn of(source: &Source, read: &ReadOptions, budget: Option<u64>) -> Result<Option<Self>, Failure> {
-        if source.path.is_none() {
+        if !source.path.as_deref().is_some_and(Path::is_file) {
             return Ok(None);
         }
         // What is beyond the limits of pictures that are held is not beyond those of rows.

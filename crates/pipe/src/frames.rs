@@ -70,12 +70,13 @@ fn remembers(project: &mut Project, session: &Session, job: &Job) -> bool {
 fn moving(job: &Job, sequence: &Sequence) -> Result<HashMap<Target, Animation>, Failure> {
     let count = sequence.frames.into_iter().count() as u32;
     let mut moving = HashMap::new();
-    for file in job.outputs.values() {
+    let dumps = job.dumps.values().map(|file| (file, false));
+    for (file, is_output) in job.outputs.values().map(|file| (file, true)).chain(dumps) {
         if Pattern::parse(file)?.is_some() {
             continue;
         }
         match Target::parse(file) {
-            Ok(target) if target.format.moves() => {
+            Ok(target) if is_output && target.format.moves() => {
                 if sequence.resume {
                     return Err(Failure::Graph(format!(
                         "{file} is written as a whole and cannot be resumed\n  next: run it without --resume"
@@ -90,8 +91,9 @@ fn moving(job: &Job, sequence: &Sequence) -> Result<HashMap<Target, Animation>, 
                 moving.insert(target, animation);
             }
             _ if count > 1 => {
+                let all = if is_output { ", or one for all: out.apng, out.gif" } else { "" };
                 return Err(Failure::Graph(format!(
-                    "every frame would be written to {file}\n  next: name a file for each frame with `####`, such as out.####.exr, or one for all: out.apng, out.gif"
+                    "every frame would be written to {file}\n  next: name a file for each frame with `####`, such as out.####.exr{all}"
                 )));
             }
             _ => {}
@@ -100,6 +102,9 @@ fn moving(job: &Job, sequence: &Sequence) -> Result<HashMap<Target, Animation>, 
     Ok(moving)
 }
 
+/// What is told of each frame that is done, with what there is to say about it unless it was skipped.
+pub type Step<'a> = dyn Fn(u32, Option<&Report>) -> Result<(), Failure> + Sync + 'a;
+
 /// Runs every frame.
 pub fn run_sequence(
     session: &mut Session,
@@ -107,7 +112,7 @@ pub fn run_sequence(
     sequence: &Sequence,
     cancel: &AtomicBool,
     say: &(dyn Fn(&str) + Sync),
-    step: &(dyn Fn() + Sync),
+    step: &Step<'_>,
 ) -> Result<Outcome, Failure> {
     let mut project = Project::open(&job.graph)?;
     let kinds = input_kinds(&mut project);
@@ -131,8 +136,9 @@ pub fn run_sequence(
             for frame in frames {
                 let mut read = || -> Result<(Job, Option<Inputs>), Failure> {
                     let job = at_frame(job, frame)?;
-                    let done =
-                        sequence.resume && !job.outputs.is_empty() && job.outputs.values().all(|f| std::path::Path::new(f).is_file());
+                    // An empty file is what a full disk leaves behind.
+                    let there = |file: &String| std::fs::metadata(file).is_ok_and(|about| about.is_file() && about.len() > 0);
+                    let done = sequence.resume && !job.outputs.is_empty() && job.outputs.values().all(there);
                     let inputs = if done { None } else { Some(decoder.inputs(&job, kinds)?) };
                     Ok((job, inputs))
                 };
@@ -143,10 +149,11 @@ pub fn run_sequence(
         });
         let encoder = scope.spawn(move || -> Result<(u32, Option<Report>), Failure> {
             let (mut written, mut last) = (0, None);
-            while let Ok((_, finished)) = finished_rx.recv() {
-                last = Some(finished.write_into(&mut moving)?);
+            while let Ok((frame, finished)) = finished_rx.recv() {
+                let report = finished.write_into(&mut moving)?;
                 written += 1;
-                step();
+                step(frame, Some(&report))?;
+                last = Some(report);
             }
             // What has lost frames to a failure does not become a file.
             if written + skipped.load(Ordering::Relaxed) == count {
@@ -178,12 +185,12 @@ pub fn run_sequence(
                 }
                 Ok(None) => {
                     skipped.fetch_add(1, Ordering::Relaxed);
-                    step();
+                    step(frame, None)?;
                 }
                 Err(Failure::World(reason)) if sequence.skip_bad => {
                     say(&format!("warning: frame {frame} is skipped: {reason}"));
                     skipped.fetch_add(1, Ordering::Relaxed);
-                    step();
+                    step(frame, None)?;
                 }
                 Err(Failure::World(reason)) => {
                     result = Err(Failure::World(format!("frame {frame}: {reason}\n  next: --skip-bad-frames goes on without it")));

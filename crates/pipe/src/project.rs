@@ -1,6 +1,8 @@
 //! A graph file on its way to a [`Graph`]: reading, checking, and saying all that is wrong.
 
 use std::collections::BTreeSet;
+use std::fs::File;
+use std::io::Read as _;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
 
@@ -9,6 +11,7 @@ use pipe_graph::document::{Document, parse};
 use pipe_graph::graph::Graph;
 use pipe_graph::node::{Loader, TableFile};
 use pipe_graph::resolve::{Request, resolve};
+use pipe_graph::syntax::MOST_BYTES;
 use pipe_graph::types::{ImageType, VolumeType};
 
 use crate::{Failure, forms, presets};
@@ -42,9 +45,10 @@ impl World {
 }
 
 impl Loader for World {
-    fn text(&self, path: &Path) -> Result<String, String> {
+    fn text(&self, path: &Path, most: usize) -> Result<String, String> {
         self.note(path);
-        match std::fs::read(path) {
+        match read_most(path, most) {
+            Ok(bytes) if bytes.len() > most => Err(format!("{} has more than {most} bytes", path.display())),
             Ok(bytes) => String::from_utf8(bytes).map_err(|_| format!("{} is no text", path.display())),
             Err(e) => {
                 // A file beside a preset is a preset too.
@@ -123,10 +127,19 @@ impl Project {
     }
 }
 
+/// What a file begins with: all of it, or one byte more than so many.
+fn read_most(path: &Path, most: usize) -> std::io::Result<Vec<u8>> {
+    let mut bytes = Vec::new();
+    File::open(path)?.take(most as u64 + 1).read_to_end(&mut bytes)?;
+    Ok(bytes)
+}
+
 /// The text of a graph, and the path that it is known by.
 fn read_graph(name: &str) -> Result<(PathBuf, String), Failure> {
     let path = PathBuf::from(name);
-    match std::fs::read(&path) {
+    match read_most(&path, MOST_BYTES) {
+        // Parsing refuses it for its length, with the place; what it was cut off from does not matter any more.
+        Ok(bytes) if bytes.len() > MOST_BYTES => Ok((path, String::from_utf8_lossy(&bytes).into_owned())),
         Ok(bytes) => match String::from_utf8(bytes) {
             Ok(text) => Ok((path, text)),
             Err(_) => Err(Failure::Graph(format!("{name} is no graph: it is not text"))),

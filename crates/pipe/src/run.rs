@@ -591,7 +591,7 @@ fn sets_alpha(graph: &Graph) -> bool {
 }
 
 /// Readback nodes and options of a graph, by the name that they are fetched by.
-fn readbacks(graph: &Graph) -> Vec<(String, ReadbackFile)> {
+pub fn readbacks(graph: &Graph) -> Vec<(String, ReadbackFile)> {
     let mut found = Vec::new();
     for (_, instance) in graph.iter() {
         let types: Vec<EdgeType> = instance.inputs.iter().map(|v| graph.ty(*v)).collect();
@@ -608,7 +608,8 @@ fn readbacks(graph: &Graph) -> Vec<(String, ReadbackFile)> {
     found
 }
 
-fn first_size(graph: &Graph) -> Vec<u32> {
+/// The size of the first input or output that has one.
+pub fn first_size(graph: &Graph) -> Vec<u32> {
     let outputs = graph.outputs().map(|(_, v)| graph.ty(v));
     let mut all = graph.inputs().map(|(_, t)| t).chain(outputs);
     let size = |t: EdgeType| match t {

@@ -91,7 +91,12 @@ fn a_wrong_graph_or_command_line_is_1_and_a_wrong_world_is_2() {
         (&["run", "tone-map", "in.exr", "out.png", "--frames", "9-"], 1, "9-"),
         (&["run", "wrong.ron", "out.png"], 1, "there is no node kind `Blurr`"),
         (&["run", "tone-map", "in.####.exr", "out.####.png"], 1, "--frames A-B"),
+        (&["run", "tone-map", "in.exr", "out.png", "--timeout", "0"], 1, "expected 1 second or more"),
+        (&["plan", "tone-map", "--after", "fuse", "--svg"], 1, "--svg shows a whole plan"),
+        (&["plan", "tone-map", "--after", "fusion"], 1, "lower, prune, fuse, schedule or allocate"),
         (&["run", "tone-map", "none.exr", "out.png"], 2, "cannot read `none.exr`"),
+        (&["run", "tone-map", "in.exr", "out.png", "--max-pixels", "10"], 2, "512×256 pixels"),
+        (&["run", "tone-map", "in.exr", "out.png", "--max-pixels", "1000"], 2, "more than the limit of 1000 (--max-pixels)"),
         (&["run", "tone-map", "broken.exr", "out.png"], 2, "is not a valid EXR file"),
         (&["run", "tone-map", "in.exr", "none/out.png"], 2, "create its folder first"),
         (&["run", "tone-map", "in.exr", "out.png", "--device", "no such"], 2, "no device fits"),
@@ -140,6 +145,30 @@ fn a_shader_that_loops_for_ever_ends_in_an_error() {
         succeeds(folder.path(), &["run", "glow.ron", "in.exr", "out.exr", "--vram", "256KiB"]);
         fs::remove_file(folder.path().join("out.exr")).expect("it was written");
     }
+}
+
+/// What never ends is not read to its end.
+#[cfg(unix)]
+#[test]
+fn a_device_is_neither_graph_nor_picture() {
+    let folder = folder();
+    let folder = folder.path();
+    for (node, says) in [
+        ("Subgraph(file: \"/dev/zero\")", "has more than 1048576 bytes"),
+        ("Wgsl(shader: \"/dev/zero\", outputs: {\"out\": Image(size: (2, 2))})", "has more than 16777216 bytes"),
+        ("ReadImage(path: \"/dev/zero\")", "is not a file or a pipe: it is a device"),
+        ("ReadVolume(path: \"/dev/zero\")", "is not a file or a pipe: it is a device"),
+    ] {
+        let graph = format!("Graph(version: 1, nodes: {{\"a\": {node}}}, outputs: {{\"out\": \"a\"}})");
+        fs::write(folder.join("graph.ron"), graph).expect("written");
+        fails(folder, &["check", "graph.ron"], 1, says);
+    }
+    fails(folder, &["check", "/dev/zero"], 1, "expected at most 1048576 bytes");
+    fails(folder, &["run", "tone-map", "/dev/zero", "out.png"], 1, "is not a file or a pipe: it is a device");
+    // A pipe is read once, to its end.
+    let mut child = command(folder, &["run", "tone-map", "/dev/stdin", "out.png"]).stdin(Stdio::piped()).spawn().expect("it starts");
+    child.stdin.take().expect("piped").write_all(&fs::read(folder.join("in.exr")).expect("read")).expect("taken");
+    assert!(child.wait().expect("it ends").success());
 }
 
 #[test]
@@ -219,6 +248,14 @@ fn reports_on_stdout_are_json() {
     for key in ["graph", "size", "passes", "slots", "peak_bytes", "naive_bytes", "bytes_moved"] {
         assert!(!plan[key].is_null(), "plan has no {key}");
     }
+    assert_eq!(plan["size"], serde_json::json!([640, 480]));
+    assert_eq!(json(&["plan", "tone-map", "--size", "640x480", "--after", "allocate", "--json"]), plan);
+    let fused = json(&["plan", "tone-map", "--after", "fuse", "--json"]);
+    assert_eq!((&fused["phase"], fused["passes"].as_array().map(Vec::len)), (&serde_json::json!("fuse"), Some(3)));
+    assert!(fused["decisions"].to_string().contains("is computed inside"), "{fused}");
+    let preset = json(&["presets", "tone-map", "--json"]);
+    assert_eq!(preset["name"], "tone-map");
+    assert!(preset["text"].as_str().is_some_and(|text| text.contains("Graph(")), "{preset}");
     let compared = json(&["compare", "in.exr", "in.exr", "--json"]);
     for key in ["max_abs", "mean_abs", "rms", "flip_mean", "different_percent"] {
         assert_eq!(compared[key].as_f64(), Some(0.0), "compare says {key} = {}", compared[key]);

@@ -27,7 +27,7 @@ use crate::expr::Env;
 use crate::graph::{Graph, Instance, Options, ValueRef, Wire, Work};
 use crate::node::{Loader, Output, Registry};
 use crate::span::{Span, Syntax, Tree};
-use crate::syntax::parse_tree;
+use crate::syntax::{MOST_BYTES, parse_tree};
 use crate::types::{EdgeKind, EdgeType, Element};
 
 /// Most nodes that a graph may have once its subgraphs are in place: a guard against graphs that double at
@@ -334,7 +334,7 @@ impl Resolver<'_> {
         if let Some(known) = self.files.get(&key) {
             return known.clone();
         }
-        let read = match self.loader.text(path) {
+        let read = match self.loader.text(path, MOST_BYTES) {
             Ok(text) => parse(path, &text, self.registry, self.sources, self.diagnostics).map(Arc::new),
             Err(reason) => {
                 self.diagnostics.push(

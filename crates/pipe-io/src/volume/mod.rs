@@ -14,7 +14,6 @@ mod nrrd;
 mod numpy;
 mod raw;
 
-use std::fs::File;
 use std::io::{self, Read, Write};
 use std::path::{Path, PathBuf};
 
@@ -24,7 +23,7 @@ use crate::atomic::AtomicFile;
 use crate::error::{Error, Fault, Result};
 use crate::guard::shielded;
 use crate::picture::Sample;
-use crate::source::{Limits, Source, load};
+use crate::source::{self, Limits, Source, load};
 
 /// A file format for volumes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -276,7 +275,7 @@ pub fn probe(source: &Source, limits: &Limits) -> Result<VolumeHeader> {
     let Some(path) = &source.path else { return Ok(read(source, limits)?.header) };
     let failed = |error| Error::read(source, error);
     let mut bytes = Vec::new();
-    File::open(path).map_err(failed)?.take(BEGINNING).read_to_end(&mut bytes).map_err(failed)?;
+    source::open(source, path)?.take(BEGINNING).read_to_end(&mut bytes).map_err(failed)?;
     let (_, opened) = open(source, &bytes, limits)?;
     Ok(opened.header)
 }

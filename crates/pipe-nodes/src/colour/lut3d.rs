@@ -32,13 +32,16 @@ pub(super) const KIND: Kind = Kind::of::<Lut3d>(
 )
 .tolerance(5e-6, 1e-5);
 
+/// Longest file: a cube of 256³ colours with thrice ten digits each.
+const MOST_BYTES: usize = 1 << 29;
+
 impl Node for Lut3d {
     fn open(&mut self, cx: &Opening<'_>) -> Result<(), Mistake> {
         let wrong = |message: String| Mistake::in_field("path", message);
         if self.path.is_empty() {
             return Err(wrong("is missing".to_owned()).hint("expected `path: \"look.cube\"`"));
         }
-        let text = cx.loader.text(&cx.folder.join(&self.path)).map_err(|reason| wrong(format!("cannot be read: {reason}")))?;
+        let text = cx.loader.text(&cx.folder.join(&self.path), MOST_BYTES).map_err(|reason| wrong(format!("cannot be read: {reason}")))?;
         self.cube = Cube::parse(&text).map_err(|reason| wrong(format!("is no .cube file that can be used: {reason}")))?;
         Ok(())
     }

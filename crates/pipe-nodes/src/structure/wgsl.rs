@@ -257,13 +257,16 @@ impl Wgsl {
     }
 }
 
+/// Longest shader.
+const MOST_BYTES: usize = 1 << 24;
+
 impl Node for Wgsl {
     fn open(&mut self, cx: &Opening<'_>) -> Result<(), Mistake> {
         if self.outputs.is_empty() {
             return Err(Mistake::new("has no outputs").hint("expected `outputs: {\"out\": Image(like: \"INPUT\")}`"));
         }
         let path = cx.folder.join(&self.shader);
-        let text = cx.loader.text(&path).map_err(|reason| Mistake::in_field("shader", format!("cannot be read: {reason}")))?;
+        let text = cx.loader.text(&path, MOST_BYTES).map_err(|reason| Mistake::in_field("shader", format!("cannot be read: {reason}")))?;
         let (_, function) = self.entry();
         if !defines(&text, function) {
             return Err(Mistake::in_field("shader", format!("defines no `fn {function}`")).hint(format!(

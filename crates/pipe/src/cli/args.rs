@@ -157,7 +157,7 @@ pub(crate) struct PlanArgs {
     /// Size of the inputs, 1920x1080 unless given.
     #[arg(long, value_name = "WxH")]
     pub(crate) size: Option<String>,
-    /// Show what there is after a phase: lower, prune, fuse, schedule.
+    /// Show what there is after a phase: lower, prune, fuse, schedule, allocate.
     #[arg(long, value_name = "PHASE")]
     pub(crate) after: Option<String>,
     /// As JSON.
@@ -341,12 +341,17 @@ pub(crate) fn job(a: &RunArgs) -> Result<Job, Failure> {
     job.settings = settings(&a.set)?;
     for text in &a.dump {
         let (node, file) = pair(text, "--dump")?;
-        job.dumps.insert(node, file);
+        if let Some(before) = job.dumps.insert(node.clone(), file) {
+            return Err(Failure::Graph(format!("--dump {node} is given twice, first as {before}\n  next: keep one of them")));
+        }
     }
     job.fuse = !a.device.no_fuse;
     job.budget = a.device.vram.as_deref().map(bytes).transpose()?;
     job.seed = a.seed;
-    job.timeout = Some(std::time::Duration::from_secs(a.timeout.max(1)));
+    if a.timeout < 1 {
+        return Err(Failure::Graph(format!("--timeout {}: expected 1 second or more", a.timeout)));
+    }
+    job.timeout = Some(std::time::Duration::from_secs(a.timeout));
     if !(a.fps > 0.0 && a.fps <= 1000.0) {
         return Err(Failure::Graph(format!("--fps {}: expected more than 0, at most 1000", a.fps)));
     }

@@ -40,7 +40,7 @@ pub(super) fn presets(a: &PresetsArgs) -> Result<(), Failure> {
             let hint = nearest(name, presets::names()).map_or("`pipe presets` lists all".to_owned(), |n| format!("did you mean `{n}`?"));
             return Err(Failure::Graph(format!("there is no preset `{name}`\n  next: {hint}")));
         };
-        return print(text);
+        return if a.json { print_json(&serde_json::json!({"name": name.trim_end_matches(".ron"), "text": text})) } else { print(text) };
     }
     let mut rows = Vec::new();
     for name in presets::names() {

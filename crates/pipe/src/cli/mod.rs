@@ -12,6 +12,7 @@ mod library;
 mod output;
 mod plan;
 mod run;
+mod targets;
 mod watch;
 
 use std::io::{IsTerminal, Write};

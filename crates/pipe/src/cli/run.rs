@@ -1,16 +1,21 @@
 //! `run`: files through a graph, once or for every frame.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
+use indexmap::IndexMap;
 use pipe::Failure;
 use pipe::decode::Decoder;
 use pipe::frames::{Sequence, run_sequence};
-use pipe::project::Project;
+use pipe::project::{Project, World};
 use pipe::run::{Job, Report, Session, input_kinds};
 use pipe_graph::document::Document;
+use pipe_graph::graph::Graph;
+use pipe_graph::node::Loader as _;
+use pipe_graph::resolve::Request;
+use pipe_graph::types::{EdgeKind, EdgeType};
 use pipe_io::atomic::AtomicFile;
 use pipe_io::mesh::MeshFormat;
 use pipe_io::sequence::{FrameRange, Pattern};
@@ -18,6 +23,7 @@ use pipe_io::volume::VolumeFormat;
 use pipe_io::{Source, Target};
 
 use super::args::{self, RunArgs};
+use super::targets::refuse_clashes;
 use super::{cache_folder, colour, device_choice, output};
 
 /// Runs the graph.
@@ -27,12 +33,11 @@ pub(super) fn run(a: &RunArgs) -> Result<(), Failure> {
     let mut project = Project::open(&a.graph)?;
     let Some(document) = project.document.clone() else { return Err(project.failure(colour())) };
     bind(&mut job, &document, a)?;
-    refuse_overwriting(&job)?;
-    // Mistakes are told before anything large is read.
-    check_early(&mut project, &job)?;
+    let frames = frames(a, &job)?;
+    check_early(&mut project, &job, a, frames)?;
     let choice = device_choice(a.device.device.as_deref());
     let cache = cache_folder();
-    match frames(a, &job)? {
+    match frames {
         Some(frames) => {
             let mut session = Session::open(&choice, cache.as_deref())?;
             let sequence = Sequence { frames, resume: a.resume, skip_bad: a.skip_bad_frames };
@@ -45,14 +50,14 @@ pub(super) fn run(a: &RunArgs) -> Result<(), Failure> {
                 &|message| {
                     bar.suspend(|| output::say(message));
                 },
-                &|| bar.inc(1),
+                &|frame, report| {
+                    bar.inc(1);
+                    report.map_or(Ok(()), |report| write_reports(a, report, Some(frame)))
+                },
             )?;
             bar.finish_and_clear();
             output::say(&format!("{} frames written, {} skipped", outcome.written, outcome.skipped));
-            if let Some(report) = outcome.last {
-                write_reports(a, &report)?;
-            }
-            Ok(())
+            outcome.last.map_or(Ok(()), |report| write_reports(a, &report, None))
         }
         None => {
             let kinds = input_kinds(&mut project);
@@ -83,7 +88,7 @@ pub(super) fn run(a: &RunArgs) -> Result<(), Failure> {
             if output::verbose() {
                 output::say(&describe(&report));
             }
-            write_reports(a, &report)
+            write_reports(a, &report, None)
         }
     }
 }
@@ -115,11 +120,13 @@ pub(super) fn bind(job: &mut Job, document: &Document, a: &RunArgs) -> Result<()
     for text in &a.input {
         let (name, file) = args::pair(text, "-i")?;
         known(&name, &inputs, "input")?;
+        once("input", &name, job.inputs.get(&name), &file)?;
         job.bind_input(&name, &file);
     }
     for text in &a.output {
         let (name, file) = args::pair(text, "-o")?;
         known(&name, &outputs, "output")?;
+        once("output", &name, job.outputs.get(&name), &file)?;
         job.bind_output(&name, &file)?;
     }
     let open_inputs: Vec<&str> = inputs.iter().copied().filter(|n| !job.inputs.contains_key(*n)).collect();
@@ -161,23 +168,6 @@ fn has_readback(document: &Document) -> bool {
     document.nodes.iter().any(|c| c.kind.value == "Readback" || c.options.is_some())
 }
 
-/// An output must not overwrite an input by mistake.
-pub(super) fn refuse_overwriting(job: &Job) -> Result<(), Failure> {
-    if job.force {
-        return Ok(());
-    }
-    let real = |text: &str| Source::parse(text).path.and_then(|p| p.canonicalize().ok());
-    for out in job.outputs.values().chain(job.dumps.values()) {
-        let Some(path) = Path::new(out).canonicalize().ok() else { continue };
-        if let Some(input) = job.inputs.values().find(|i| real(i).as_ref() == Some(&path)) {
-            return Err(Failure::Graph(format!(
-                "the output {out} would overwrite the input {input}\n  next: choose another name, or add --force"
-            )));
-        }
-    }
-    Ok(())
-}
-
 /// Whether a file's name ends as those of tables, volumes and meshes do.
 fn is_no_image(file: &str) -> bool {
     let path = Path::new(file);
@@ -185,23 +175,56 @@ fn is_no_image(file: &str) -> bool {
     table || VolumeFormat::of_name(path).is_some() || MeshFormat::of(path).is_ok()
 }
 
-/// Resolves with the sizes in the files' headers, where they can be read cheaply.
-fn check_early(project: &mut Project, job: &Job) -> Result<(), Failure> {
+/// Tells mistakes and clashes before anything large is read.
+fn check_early(project: &mut Project, job: &Job, a: &RunArgs, frames: Option<FrameRange>) -> Result<(), Failure> {
     for file in job.outputs.values() {
         if !is_no_image(file) {
             Target::parse(file)?;
         }
     }
-    let request = pipe_graph::resolve::Request { settings: job.settings.clone(), frame: job.frame, ..Default::default() };
-    let world = pipe::project::World::new(job.read);
-    // Sizes are unknown here, so only what is wrong at any size may end the run; sizes are checked with the pixels.
-    if job.inputs.is_empty() || project.diagnostics.has_errors() {
-        project.resolve(&request, &world);
-        if project.diagnostics.has_errors() {
-            return Err(project.failure(colour()));
-        }
+    let broken = project.diagnostics.has_errors();
+    let (graph, world) = foresee(project, job, frames)?;
+    // Some sizes may be unknown here, so only what is wrong at any size may end the run; sizes are checked with the pixels.
+    if broken || (job.inputs.is_empty() && graph.is_none()) {
+        return Err(project.failure(colour()));
     }
-    Ok(())
+    refuse_clashes(job, a, graph.as_ref(), &world, frames)
+}
+
+/// Resolves with the sizes in the files' headers, where they can be read cheaply; the world has then seen what files the graph
+/// names.
+pub(super) fn foresee(project: &mut Project, job: &Job, frames: Option<FrameRange>) -> Result<(Option<Graph>, World), Failure> {
+    let world = World::new(job.read);
+    let request = Request { inputs: sizes(project, job, frames)?, settings: job.settings.clone(), frame: job.frame, ..Request::default() };
+    let graph = project.resolve(&request, &world);
+    Ok((graph, world))
+}
+
+/// The types of the inputs, as far as files say so cheaply: a pipe can be read once only.
+fn sizes(project: &mut Project, job: &Job, frames: Option<FrameRange>) -> Result<IndexMap<String, EdgeType>, Failure> {
+    let (world, kinds) = (World::new(job.read), input_kinds(project));
+    let mut types = IndexMap::new();
+    for (name, file) in &job.inputs {
+        let pattern = Pattern::parse(file)?;
+        let file = frames.zip(pattern).map_or_else(|| file.clone(), |(frames, pattern)| pattern.name(frames.first));
+        let path = Path::new(&file);
+        let ty = match kinds.get(name) {
+            _ if !Source::parse(&file).path.is_some_and(|path| path.is_file()) => None,
+            Some(EdgeKind::Image) => world.image(path).ok().map(EdgeType::Image),
+            Some(EdgeKind::Volume) => world.volume(path).ok().map(EdgeType::Volume),
+            _ => None,
+        };
+        types.extend(ty.map(|ty| (name.clone(), ty)));
+    }
+    Ok(types)
+}
+
+/// A port takes one file.
+fn once(what: &str, name: &str, before: Option<&String>, file: &str) -> Result<(), Failure> {
+    match before {
+        Some(before) => Err(Failure::Graph(format!("the {what} `{name}` is given twice: {before} and {file}\n  next: keep one of them"))),
+        None => Ok(()),
+    }
 }
 
 /// The frames to run, when inputs or outputs are patterns.
@@ -245,17 +268,25 @@ pub(super) fn passes(r: &Report) -> String {
     }
 }
 
-fn write_reports(a: &RunArgs, report: &Report) -> Result<(), Failure> {
-    let save = |path: &PathBuf, value: &serde_json::Value| {
-        let text = serde_json::to_string_pretty(value).unwrap_or_default() + "\n";
+/// Writes the reports that belong to a frame, or with `None` those that belong to the run: in a sequence to its last frame.
+fn write_reports(a: &RunArgs, report: &Report, frame: Option<u32>) -> Result<(), Failure> {
+    let save = |path: &Path, value: &dyn Fn() -> serde_json::Value| {
+        let name = path.to_string_lossy();
+        let pattern = if a.frames.is_some() { Pattern::parse(&name)? } else { None };
+        let path = match (pattern, frame) {
+            (Some(pattern), Some(frame)) => pattern.path(frame),
+            (None, None) => path.to_owned(),
+            _ => return Ok(()),
+        };
+        let text = serde_json::to_string_pretty(&value()).unwrap_or_default() + "\n";
         AtomicFile::write_whole((path.as_os_str() != "-").then_some(path.as_path()), text.as_bytes())
             .map_err(|e| Failure::World(format!("cannot write `{}`: {e}", path.display())))
     };
     if let Some(path) = &a.stats {
-        save(path, &report.to_json())?;
+        save(path, &|| report.to_json())?;
     }
     if let Some(path) = &a.trace {
-        save(path, &trace(report))?;
+        save(path, &|| trace(report))?;
     }
     Ok(())
 }

@@ -12,7 +12,8 @@ use pipe::project::Project;
 use pipe::run::{Report, Session};
 
 use super::args::{self, RunArgs};
-use super::run::{bind, describe, passes, refuse_overwriting};
+use super::run::{bind, describe, foresee, passes};
+use super::targets::refuse_clashes;
 use super::{cache_folder, colour, device_choice, output};
 
 /// Time between two looks at the files.
@@ -44,10 +45,11 @@ pub(super) fn watch(a: &RunArgs) -> Result<(), Failure> {
 fn once(session: &mut Session, a: &RunArgs) -> Result<Report, Failure> {
     let mut job = args::job(a)?;
     job.keep = true;
-    let project = Project::open(&a.graph)?;
+    let mut project = Project::open(&a.graph)?;
     let Some(document) = project.document.clone() else { return Err(project.failure(colour())) };
     bind(&mut job, &document, a)?;
-    refuse_overwriting(&job)?;
+    let (graph, world) = foresee(&mut project, &job, None)?;
+    refuse_clashes(&job, a, graph.as_ref(), &world, None)?;
     session.run(&job)
 }
 
