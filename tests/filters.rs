@@ -259,11 +259,15 @@ fn a_bright_pixel_leaves_nothing_behind() {
     let mut bench = Bench::new();
     let size = [81, 61];
     let inputs = |_: &str| {
-        Tensor::Image(Raster::from_fn(size, 1, |x, y| [if (x, y) == (40, 30) { 2e4 } else { 0.3 + 0.005 * x as f64 + 0.002 * y as f64 }; 4]))
+        Tensor::Image(Raster::from_fn(size, 1, |x, y| {
+            [if (x, y) == (40, 30) { 2e4 } else { 0.3 + 0.005 * x as f64 + 0.002 * y as f64 }; 4]
+        }))
     };
-    for (node, reach) in
-        [("BoxBlur(image: \"grey\", radius: 1)", 1), ("BoxBlur(image: \"grey\", radius: 20)", 20), ("Guided(image: \"grey\", radius: 8)", 16)]
-    {
+    for (node, reach) in [
+        ("BoxBlur(image: \"grey\", radius: 1)", 1),
+        ("BoxBlur(image: \"grey\", radius: 20)", 20),
+        ("Guided(image: \"grey\", radius: 8)", 16),
+    ] {
         let graph = graph(node, "out", "Clamp", size);
         let expected = &reference(&graph, &inputs)["out"];
         for profile in [Profile::Gpu, Profile::Cpu] {

@@ -34,7 +34,12 @@ pub(super) struct BoxBlur {
 pub(super) const KIND: Kind = Kind::of::<BoxBlur>(
     "BoxBlur",
     Category::Filters,
-    &[r#"BoxBlur(image: "in", radius: 2)"#, r#"BoxBlur(image: "grey", radius: 20)"#, r#"BoxBlur(image: "pair", radius: 40)"#, r#"BoxBlur(image: "in", radius: 0)"#],
+    &[
+        r#"BoxBlur(image: "in", radius: 2)"#,
+        r#"BoxBlur(image: "grey", radius: 20)"#,
+        r#"BoxBlur(image: "pair", radius: 40)"#,
+        r#"BoxBlur(image: "in", radius: 0)"#,
+    ],
 )
 .tolerance(2e-6, 1e-5);
 
