@@ -4,7 +4,7 @@ use pipe_graph::graph::Graph;
 use pipe_graph::reference::Tensor;
 use pipe_graph::types::EdgeType;
 use pipe_plan::Options;
-use pipe_tests::bench::{Bench, Values, compile, plan, reference};
+use pipe_tests::bench::{Bench, Values, compile, compile_with, plan, reference};
 use pipe_tests::source::{edge, edge_type};
 
 const SIZE: [u32; 2] = [61, 47];
@@ -120,6 +120,112 @@ fn a_bypassed_node_passes_its_input_through() {
     let graph = graph(r#""soft": BlurV(image: "in", options: (when: false)), "negative": Invert(image: "soft")"#, "negative");
     let got = Bench::new().gpu(&graph, &input).unwrap_or_else(|e| panic!("{e}"));
     close(&got, &reference(&graph, &input), 1e-6, "bypass");
+}
+
+/// A graph with a flag and a number as parameters, some of it set from outside.
+fn with_parameters(nodes: &str, output: &str, settings: &[(&str, &str)]) -> Result<Graph, String> {
+    let text = format!(
+        r#"Graph(version: 1, params: {{"flag": Bool(default: false), "k": F32(default: 2)}}, inputs: {{"in": Image, "other": Image}},
+        nodes: {{{nodes}}}, outputs: {{"out": "{output}"}})"#
+    );
+    let types: [(&str, EdgeType); 2] = ["in", "other"].map(|n| (n, edge_type(n, SIZE)));
+    compile_with(&text, &types, settings)
+}
+
+/// Two graphs make the same.
+fn alike(bench: &mut Bench, graph: &Graph, plain: &Graph, what: &str) {
+    let got = bench.gpu(graph, &input).unwrap_or_else(|e| panic!("{what}: {e}"));
+    let expected = bench.gpu(plain, &input).unwrap_or_else(|e| panic!("{what}: {e}"));
+    close(&got, &expected, 1e-6, what);
+}
+
+#[test]
+fn flags_of_a_subgraph_are_set() {
+    let mut bench = Bench::new();
+    let on = graph(r#""a": Exposure(image: "in", ev: 1), "b": Offset(image: "a", x: 3)"#, "b");
+    let off = graph(r#""b": Offset(image: "in", x: 3, wrap: false)"#, "b");
+    for (value, plain) in
+        [("true", &on), ("false", &off), ("\"=k > 1\"", &on), ("\"=k < 1\"", &off), ("\"=flag\"", &off), ("\"=!flag\"", &on)]
+    {
+        let nodes = format!(r#""s": Subgraph(file: "diagnostics/parts/flag.ron", inputs: {{"x": "in"}}, params: {{"on": {value}}})"#);
+        let given = with_parameters(&nodes, "s", &[]).unwrap_or_else(|e| panic!("{value}: {e}"));
+        alike(&mut bench, &given, plain, value);
+    }
+    let nodes = r#""s": Subgraph(file: "diagnostics/parts/flag.ron", inputs: {"x": "in"})"#;
+    for name in ["s.on", "s/on", "s.params.on"] {
+        let set = with_parameters(nodes, "s", &[(name, "false")]).unwrap_or_else(|e| panic!("{name}: {e}"));
+        alike(&mut bench, &set, &off, name);
+    }
+}
+
+#[test]
+fn what_shapes_a_graph_is_bypassed_like_a_node() {
+    let mut bench = Bench::new();
+    let plain = graph(r#""a": Switch(inputs: ["in"])"#, "a");
+    let other = graph(r#""a": Switch(inputs: ["other"])"#, "a");
+    let both = r#"Subgraph(file: "diagnostics/parts/both.ron", inputs: {"other": "other", "base": "in"}, options: (when: false))"#;
+    let swap = r#"Iterate(state: {"a": "in", "b": "other"}, body: {"m": Mix(a: "a", b: "b")}, next: {"a": "m", "b": "a"}, count: 3,
+        options: (when: "=1 > 2"))"#;
+    for (node, port, passed) in [
+        (both, "", &plain),
+        (both, ".grey", &plain),
+        (swap, ".a", &plain),
+        (swap, ".b", &other),
+        (r#"Switch(index: 1, inputs: ["in", "other"], options: (when: false))"#, "", &plain),
+        (r#"Feedback(init: "in", next: "n", options: (when: false))"#, "", &plain),
+    ] {
+        let bypassed = graph(&format!(r#""n": {node}"#), &format!("n{port}"));
+        assert!(bypassed.iter().all(|(_, i)| i.kind == "Input"), "{node} leaves something behind");
+        alike(&mut bench, &bypassed, passed, node);
+    }
+}
+
+#[test]
+fn a_subgraph_repeats_like_a_node() {
+    let mut bench = Bench::new();
+    let part = |base: &str, options: &str| {
+        format!(r#"Subgraph(file: "diagnostics/parts/both.ron", inputs: {{"other": "other", "base": "{base}"}}{options})"#)
+    };
+    let chain = format!(r#""a": {}, "b": {}, "c": {}"#, part("in", ""), part("a", ""), part("b", ""));
+    for (times, last) in [(1, "a"), (2, "b"), (3, "c")] {
+        let nodes = format!(r#""n": {}"#, part("in", &format!(", options: (repeat: {times})")));
+        both_ways(&mut bench, &nodes, "n");
+        alike(&mut bench, &graph(&nodes, "n"), &graph(&chain, last), &nodes);
+    }
+}
+
+#[test]
+fn what_a_subgraph_makes_is_read_back() {
+    let part = |options: &str| {
+        format!(r#""n": Subgraph(file: "diagnostics/parts/both.ron", inputs: {{"other": "other", "base": "in"}}, options: ({options}))"#)
+    };
+    let fetched = |options: &str| {
+        let graph = graph(&part(options), "n.out");
+        let plan = plan(&graph, &pipe_graph::pass::Limits::default(), &Options::default()).unwrap_or_else(|e| panic!("{e}"));
+        plan.to_text().contains("n:readback")
+    };
+    assert!(fetched(r#"readback: "first.npy""#), "as it stands");
+    assert!(fetched(r#"readback: "first.npy", repeat: 2"#), "repeated");
+    assert!(!fetched(r#"readback: "first.npy", when: false"#), "bypassed");
+}
+
+#[test]
+fn parameters_of_a_shader_and_options_are_set() {
+    let mut bench = Bench::new();
+    let nodes = r#""w": Wgsl(shader: "diagnostics/parts/gain.wgsl", inputs: {"image": "in"}, outputs: {"out": Image(like: "image")},
+        params: {"gain": F32(default: 2), "shift": I32(default: 0)}, access: Point)"#;
+    let gain = graph(r#""a": Math(a: "in", b: 3, op: Mul)"#, "a");
+    for name in ["w.gain", "w.params.gain", "w.params.gain.default"] {
+        let set = with_parameters(nodes, "w", &[(name, "3")]).unwrap_or_else(|e| panic!("{name}: {e}"));
+        alike(&mut bench, &set, &gain, name);
+    }
+    let plain = graph(r#""a": Switch(inputs: ["in"])"#, "a");
+    let off = with_parameters(nodes, "w", &[("w.options.when", "false")]).unwrap_or_else(|e| panic!("{e}"));
+    alike(&mut bench, &off, &plain, "w.options.when");
+    let mistake = |name: &str, value: &str| with_parameters(nodes, "w", &[(name, value)]).expect_err(name);
+    assert!(mistake("w.params.gian", "3").contains("--set w.params.gian: `w` has no `params.gian`"));
+    assert!(mistake("w.shift", "0.5").contains("0.5 is no whole number"));
+    assert!(mistake("w.gian", "3").contains("unknown field `gian`"));
 }
 
 #[test]

@@ -53,10 +53,19 @@ impl Loader for NoFiles {
 
 /// Resolves a graph text; the rendered mistakes otherwise.
 pub fn compile(text: &str, inputs: &[(&str, EdgeType)]) -> Result<Graph, String> {
+    compile_with(text, inputs, &[])
+}
+
+/// Resolves a graph text as with `--set`; the rendered mistakes otherwise.
+pub fn compile_with(text: &str, inputs: &[(&str, EdgeType)], settings: &[(&str, &str)]) -> Result<Graph, String> {
     let (mut sources, mut diagnostics) = (Sources::default(), Diagnostics::default());
     let registry = registry();
     let document = parse(Path::new("test.ron"), text, &registry, &mut sources, &mut diagnostics);
-    let request = Request { inputs: inputs.iter().map(|(n, t)| ((*n).to_owned(), *t)).collect(), ..Request::default() };
+    let request = Request {
+        inputs: inputs.iter().map(|(n, t)| ((*n).to_owned(), *t)).collect(),
+        settings: settings.iter().map(|(name, value)| ((*name).to_owned(), (*value).to_owned())).collect(),
+        ..Request::default()
+    };
     let graph = document.and_then(|d| resolve(&d, &request, &registry, &NoFiles, &mut sources, &mut diagnostics));
     match graph {
         Some(graph) if !diagnostics.has_errors() => Ok(graph),

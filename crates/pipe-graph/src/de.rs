@@ -685,7 +685,14 @@ impl<'de> VariantAccess<'de> for TreeDeserializer<'_> {
             Syntax::Tuple(_, values) if values.len() > known.len() => {
                 Err(Error::at(self.tree.span, format!("found {} values", values.len()), format!("expected {}", known.join(", "))))
             }
-            Syntax::Tuple(_, values) if !values.is_empty() => self.place(visitor.visit_seq(Elements { d: self, values: values.iter() })),
+            Syntax::Tuple(_, values) if !values.is_empty() => {
+                let read = visitor.visit_seq(Elements { d: self, values: values.iter() });
+                // serde counts in Rust types when values are missing.
+                read.map_err(|e| match e.span {
+                    Some(_) => e,
+                    None => Error::at(self.tree.span, format!("found {} values", values.len()), format!("expected {}", known.join(", "))),
+                })
+            }
             _ => de::Deserializer::deserialize_struct(self, "", known, visitor),
         }
     }

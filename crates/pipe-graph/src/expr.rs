@@ -362,7 +362,7 @@ fn build(pair: Pair<'_, Rule>, pratt: &PrattParser<Rule>, depth: usize) -> Resul
                 Rule::call => {
                     let mut parts = p.into_inner();
                     let name = parts.next().expect("a call begins with its name");
-                    let args: Vec<Expr> = parts.map(|a| build(a, pratt, depth + 1)).collect::<Result<_, _>>()?;
+                    let mut args: Vec<Expr> = parts.map(|a| build(a, pratt, depth + 1)).collect::<Result<_, _>>()?;
                     let Some(f) = FUNCTIONS.iter().find(|f| f.name == name.as_str()) else {
                         let names = FUNCTIONS.iter().map(|f| f.name);
                         let e = ExprError::new(span(&name), format!("there is no function `{}`", name.as_str()));
@@ -371,9 +371,16 @@ fn build(pair: Pair<'_, Rule>, pratt: &PrattParser<Rule>, depth: usize) -> Resul
                             None => e.hint(format!("known: {}", FUNCTIONS.iter().map(|f| f.name).collect::<Vec<_>>().join(" "))),
                         });
                     };
-                    if args.len() != f.arity {
+                    let folds = matches!(f.name, "min" | "max");
+                    if args.len() < f.arity || (args.len() > f.arity && !folds) {
                         let (name, want, got) = (f.name, f.arity, args.len());
-                        return Err(ExprError::new(range, format!("`{name}` takes {want} arguments, not {got}")));
+                        let more = if folds { " or more" } else { "" };
+                        return Err(ExprError::new(range, format!("`{name}` takes {want} arguments{more}, not {got}")));
+                    }
+                    // The least of several is the least of two and of the others.
+                    while args.len() > f.arity {
+                        let two: Vec<Expr> = args.drain(..2).collect();
+                        args.insert(0, Expr { range: range.clone(), kind: Kind::Call(f, two) });
                     }
                     Kind::Call(f, args)
                 }
@@ -448,6 +455,8 @@ mod tests {
             ("10 - 2 - 3", 5.0),
             ("0.01*in.width", 6.4),
             ("max(1, min(5, 3))", 3.0),
+            ("min(5, 3, 4)", 3.0),
+            ("max(1, key, in.width, 2, 3)", 640.0),
             ("clamp(9, 0, 2)", 2.0),
             ("if(key < 0.2, 1, 1/0)", 1.0),
             ("1 < 2 && !(3 <= 2)", 1.0),
@@ -466,9 +475,16 @@ mod tests {
         assert_eq!(at("sqr(2)").hint.as_deref(), Some("did you mean `sqrt`?"));
         assert_eq!(at("2 +").range, 3..3);
         assert!(at("min(1)").message.contains("2 arguments"));
+        assert_eq!(at("max(1)").message, "`max` takes 2 arguments or more, not 1");
         assert!(at("log(0-1)").message.contains("NaN"));
         assert!(value(&"(".repeat(5000)).is_err());
         assert!(value(&"-".repeat(4000)).is_err());
+    }
+
+    #[test]
+    fn the_least_of_several_is_printed_two_by_two() {
+        let text = Expr::parse("min(a, b, 1)").expect("parses").to_wgsl(&mut |n| Some(n.to_owned())).expect("known names");
+        assert_eq!(text, "min(min(a, b), 1.0f)");
     }
 
     #[test]

@@ -15,8 +15,18 @@ pub struct Subgraph {
     pub file: String,
     /// What its inputs are bound to: `{"in": "blurred"}`.
     pub inputs: IndexMap<String, In<Any>>,
-    /// Values of its parameters: numbers or expressions over the outer parameters.
-    pub params: IndexMap<String, f64>,
+    /// Values of its parameters: numbers, `true` or `false`, or expressions over the outer parameters.
+    pub params: IndexMap<String, ParameterValue>,
+}
+
+/// The value of a parameter of a subgraph.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(untagged)]
+pub enum ParameterValue {
+    /// Of a `Bool`.
+    Flag(bool),
+    /// Of any other.
+    Number(f64),
 }
 
 /// Runs a body again and again; output ports are the state names. State is ping-ponged, nothing is copied.

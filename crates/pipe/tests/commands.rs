@@ -224,8 +224,11 @@ fn statistics_say_what_was_read_back() {
         "hist": Histogram(image: "in", bins: 4, range: (0, 1)),
         "m": Readback(source: "mean", path: "mean.json"),
         "h": Readback(source: "hist", path: "hist.csv"),
+        "part": Subgraph(file: "part.ron", inputs: {"in": "in"}, options: (readback: "part.json")),
     })"#;
     fs::write(folder.join("graph.ron"), graph).expect("written");
+    let part = r#"Graph(version: 1, inputs: {"in": Image}, nodes: {"mean": PyramidAverage(image: "in")}, outputs: {"out": "mean"})"#;
+    fs::write(folder.join("part.ron"), part).expect("written");
     succeeds(folder, &["run", "graph.ron", "in.exr", "--stats", "stats.json"]);
     let stats: serde_json::Value = serde_json::from_slice(&fs::read(folder.join("stats.json")).expect("read")).expect("JSON");
     let counts = stats["readbacks"]["h"].as_array().expect("a table").iter().filter_map(serde_json::Value::as_u64);
@@ -233,6 +236,8 @@ fn statistics_say_what_was_read_back() {
     assert_eq!(stats["readbacks"]["m"].as_array().map(Vec::len), Some(4));
     let mean: serde_json::Value = serde_json::from_slice(&fs::read(folder.join("mean.json")).expect("read")).expect("JSON");
     assert_eq!(mean, stats["readbacks"]["m"]);
+    assert_eq!(mean, stats["readbacks"]["part"]);
+    assert_eq!(fs::read(folder.join("part.json")).expect("read"), fs::read(folder.join("mean.json")).expect("read"));
     assert!(fs::read_to_string(folder.join("hist.csv")).expect("read").lines().count() >= 4);
 }
 

@@ -2,8 +2,8 @@
 
 use indexmap::IndexMap;
 
-use super::Resolver;
 use super::scope::Frame;
+use super::{Given, Resolver, field_of};
 use crate::de::{EdgeUse, build_node, from_tree};
 use crate::diagnostic::Diagnostic;
 use crate::document::{Call, Field, Reader, with_nearest};
@@ -26,9 +26,17 @@ pub(super) struct Draft {
 /// What a draft will become.
 pub(super) enum What {
     Node(Box<dyn Node>),
-    Subgraph { file: Spanned<String>, inputs: Vec<(String, usize)>, params: IndexMap<String, (Span, Tree)> },
+    Subgraph(Part),
     Iterate(Box<Body>),
     Feedback { next: Spanned<String>, delay: u32 },
+}
+
+/// A `Subgraph` as it was written.
+pub(super) struct Part {
+    pub(super) file: Spanned<String>,
+    /// Names of inputs with the edge bound to each.
+    pub(super) inputs: Vec<(String, usize)>,
+    pub(super) params: Given,
 }
 
 /// The parts of an `Iterate` that are not plain fields.
@@ -60,6 +68,7 @@ impl Resolver<'_> {
         let options = call.options.as_ref().map_or_else(Options::default, |tree| {
             let (options, _, mistakes) = from_tree::<Options>(tree, frame.env);
             self.diagnostics.extend(mistakes);
+            self.refuse_options(&call, tree);
             options.unwrap_or_default()
         });
         let (what, edges) = match kind.name {
@@ -75,37 +84,45 @@ impl Resolver<'_> {
         Some(Draft { call, kind, what, edges, options })
     }
 
-    fn apply_settings(&mut self, call: &mut Call, prefix: &str) {
-        let node = format!("{prefix}{}", call.name.value);
-        for setting in &mut self.settings {
-            let Some(field) = setting.name.strip_prefix(&node).and_then(|rest| rest.strip_prefix('.')) else { continue };
-            // What is no field of a Subgraph is a parameter of its graph, set where that is resolved.
-            if call.kind.value == "Subgraph" && !["file", "inputs"].contains(&field) {
-                continue;
+    /// Options that would say nothing of a node which shapes the graph and makes no pixels itself.
+    fn refuse_options(&mut self, call: &Call, options: &Tree) {
+        let (refused, hint): (&[&str], &str) = match call.kind.value.as_str() {
+            "Subgraph" | "Iterate" => (&["format", "border", "filter"], "the nodes inside have options of their own"),
+            "Switch" => (&["format", "border", "filter"], "it passes an input on as it is; the nodes before it have options of their own"),
+            "Feedback" => {
+                (&["format", "border", "filter"], "it passes a value on as it is; the node that `next` names has options of its own")
             }
-            setting.used = true;
-            let key = Spanned { span: setting.value.span, value: field.to_owned() };
-            match call.fields.iter_mut().find(|(key, _)| key.value == field) {
-                Some((_, value)) => *value = setting.value.clone(),
-                None => call.fields.push((key, setting.value.clone())),
+            _ => return,
+        };
+        let mut refuse = |name: &str, hint: &str| {
+            if let Some((key, _)) = field_of(options, name) {
+                let message = format!("`{}` cannot have `{name}`", call.name.value);
+                self.diagnostics
+                    .push(Diagnostic::error(key.span, message).label(format!("this means nothing to {}", call.kind.value)).hint(hint));
             }
+        };
+        refused.iter().for_each(|name| refuse(name, hint));
+        match call.kind.value.as_str() {
+            "Iterate" => refuse("repeat", "`count` says how often the body of an Iterate runs"),
+            "Feedback" => refuse("repeat", "it passes one value on for each frame; Iterate passes values between iterations"),
+            _ => {}
         }
     }
 
     fn draft_subgraph(&mut self, call: &mut Call, frame: &Frame<'_>) -> Option<(What, Vec<EdgeUse>)> {
-        let mut params = IndexMap::new();
+        let mut params = Given::new();
         if let Some((_, tree)) = take(&mut call.fields, "params") {
             let mut reader = Reader { registry: self.registry, diagnostics: self.diagnostics };
             for (name, value) in reader.entries(&tree, "params") {
-                // Evaluated here, where the outer names are known.
-                let (number, _, mistakes) = match value.value {
-                    Syntax::Bool(b) => (Some(f64::from(u8::from(b))), Vec::new(), Vec::new()),
-                    _ => from_tree::<f64>(value, frame.env),
+                // Tried here, so that mistakes are told even when the file cannot be read; only the file knows the type.
+                let mistakes = match value.value {
+                    Syntax::Bool(_) => Vec::new(),
+                    _ => from_tree::<f64>(value, frame.env).2,
                 };
-                self.diagnostics.extend(mistakes);
-                if let Some(number) = number {
-                    params.insert(name.value, (name.span, Tree { span: value.span, value: Syntax::Float(number) }));
+                if mistakes.is_empty() {
+                    params.insert(name.value, (name.span, value.clone()));
                 }
+                self.diagnostics.extend(mistakes);
             }
         }
         let file = call.fields.iter().find(|(key, _)| key.value == "file").map(|(_, tree)| tree.span);
@@ -117,7 +134,7 @@ impl Resolver<'_> {
             return None;
         };
         let inputs = edge_of(&fields.inputs);
-        Some((What::Subgraph { file: Spanned { span, value: fields.file }, inputs, params }, edges))
+        Some((What::Subgraph(Part { file: Spanned { span, value: fields.file }, inputs, params }), edges))
     }
 
     fn draft_iterate(&mut self, call: &mut Call, frame: &Frame<'_>) -> Option<(What, Vec<EdgeUse>)> {

@@ -12,6 +12,8 @@
 
 mod draft;
 mod scope;
+mod settings;
+mod subgraph;
 mod usage;
 
 use std::path::{Path, PathBuf};
@@ -27,7 +29,7 @@ use crate::expr::Env;
 use crate::graph::{Graph, Instance, Options, ValueRef, Wire, Work};
 use crate::node::{Loader, Output, Registry};
 use crate::span::{Span, Syntax, Tree};
-use crate::syntax::{MOST_BYTES, parse_tree};
+use crate::syntax::MOST_BYTES;
 use crate::types::{EdgeKind, EdgeType, Element};
 
 /// Most nodes that a graph may have once its subgraphs are in place: a guard against graphs that double at
@@ -52,13 +54,6 @@ pub struct Request {
     pub time: f64,
 }
 
-/// One `--set`, parsed.
-struct Setting {
-    name: String,
-    value: Tree,
-    used: bool,
-}
-
 /// Resolves a document. Comes back with a graph only when there was no error; warnings may be there all the same.
 pub fn resolve(
     document: &Document,
@@ -68,7 +63,7 @@ pub fn resolve(
     sources: &mut Sources,
     diagnostics: &mut Diagnostics,
 ) -> Option<Graph> {
-    let settings = read_settings(&request.settings, sources);
+    let settings = settings::read(&request.settings, sources);
     let mut resolver = Resolver {
         request,
         registry,
@@ -83,17 +78,6 @@ pub fn resolve(
         bodies: 0,
     };
     resolver.graph(document)
-}
-
-fn read_settings(settings: &[(String, String)], sources: &mut Sources) -> Vec<Setting> {
-    let read = |(name, text): &(String, String)| {
-        let file = sources.add(Path::new("--set"), text);
-        // A value that is no RON is taken as plain text, so that the shell needs no second pair of quotes.
-        let value =
-            parse_tree(text, file).unwrap_or_else(|_| Tree { span: Span::new(file, 0..text.len()), value: Syntax::Text(text.clone()) });
-        Setting { name: name.clone(), value, used: false }
-    };
-    settings.iter().map(read).collect()
 }
 
 /// The path without `.` and `..`, for comparing files by name.
@@ -126,6 +110,9 @@ fn field_of<'t>(tree: &'t Tree, name: &str) -> Option<&'t Field> {
     }
 }
 
+/// Values that a node gives to the parameters of its subgraph, with the place of each name.
+type Given = IndexMap<String, (Span, Tree)>;
+
 /// A graph under construction.
 #[derive(Default)]
 struct Level {
@@ -146,7 +133,7 @@ struct Resolver<'a> {
     chain: Vec<PathBuf>,
     /// Subgraph files that were parsed already.
     files: IndexMap<PathBuf, Option<Arc<Document>>>,
-    settings: Vec<Setting>,
+    settings: Vec<settings::Setting>,
     /// Feedback nodes whose `next` is not checked yet.
     feedbacks: Vec<(ValueRef, Span)>,
     /// How many `Iterate` bodies are around the current scope.
@@ -192,7 +179,7 @@ impl Resolver<'_> {
                 self.diagnostics.push(with_nearest(d, name, inputs.keys().map(String::as_str)));
             }
         }
-        self.params(document, &IndexMap::new(), "", &mut env);
+        self.params(document, None, "", &mut env);
 
         let names = inputs.iter().map(|(name, node)| (name.clone(), Some(ValueRef { node: *node, port: 0 }))).collect();
         let folder = document.path.parent().unwrap_or(Path::new("")).to_owned();
@@ -271,22 +258,25 @@ impl Resolver<'_> {
         }
     }
 
-    /// Evaluates the parameters of a document into `env`: given values first, then `--set`, then defaults.
-    fn params(&mut self, document: &Document, given: &IndexMap<String, Tree>, prefix: &str, env: &mut Env) {
+    /// Evaluates the parameters of a document into `env`: `--set` first, then values given by the node that names the
+    /// document, which may use the names around it, then defaults.
+    fn params(&mut self, document: &Document, given: Option<(&Given, &Env)>, prefix: &str, env: &mut Env) {
         for parameter in &document.params {
             let name = &parameter.name.value;
-            // Of a subgraph's parameter, both `glow/key` and `glow.key` are names.
-            let path = format!("{prefix}{name}");
-            let dotted = prefix.strip_suffix('/').map(|node| format!("{node}.{name}"));
-            let names = |s: &&mut Setting| s.name == path || dotted.as_ref() == Some(&s.name);
-            let tree = match self.settings.iter_mut().find(names) {
-                Some(setting) => {
-                    setting.used = true;
-                    setting.value.clone()
-                }
-                None => given.get(name).unwrap_or(&parameter.default).clone(),
+            let value = if let Some(tree) = self.setting_of(name, prefix) {
+                self.param_value(parameter, &tree, env)
+            } else if let Some((tree, around)) = given.and_then(|(values, around)| Some((&values.get(name)?.1, around))) {
+                // To a parameter that takes numbers a flag is 1 or 0, as it is to expressions.
+                let number = match tree.value {
+                    Syntax::Bool(flag) if parameter.ty != ParameterType::Bool => {
+                        Some(Tree { value: Syntax::Integer(flag.into()), ..*tree })
+                    }
+                    _ => None,
+                };
+                self.param_value(parameter, number.as_ref().unwrap_or(tree), around)
+            } else {
+                self.param_value(parameter, &parameter.default, env)
             };
-            let value = self.param_value(parameter, &tree, env);
             env.set(name, value);
         }
     }
@@ -359,18 +349,6 @@ impl Resolver<'_> {
                     Diagnostic::error(span, format!("`next` is {next}, but `init` is {init}"))
                         .label("expected a value of the same type as `init`"),
                 );
-            }
-        }
-    }
-
-    fn check_settings(&mut self, document: &Document) {
-        let nodes = self.level().dag.node_weights().map(|i| i.name.clone());
-        let known: Vec<String> = document.params.iter().map(|p| p.name.value.clone()).chain(nodes).collect();
-        for setting in std::mem::take(&mut self.settings) {
-            if !setting.used {
-                let d = Diagnostic::error(setting.value.span, format!("--set {}: there is no such parameter or node", setting.name));
-                let node = setting.name.split('.').next().unwrap_or_default();
-                self.diagnostics.push(with_nearest(d, node, known.iter().map(String::as_str)));
             }
         }
     }

@@ -10,14 +10,14 @@ use petgraph::algo::tarjan_scc;
 use petgraph::graph::{DiGraph, NodeIndex};
 
 use super::draft::{Body, Draft, What};
-use super::{Level, MOST_NODES, Resolver, article, field_of, normal};
+use super::{Level, MOST_NODES, Resolver, article, field_of};
 use crate::de::EdgeUse;
 use crate::diagnostic::Diagnostic;
 use crate::document::{Call, with_nearest};
 use crate::expr::Env;
 use crate::graph::{Format, Graph, Instance, Iteration, Options, Times, ValueRef, Wire, Work};
 use crate::node::{Inputs, Mistake, Node, Opening, Output};
-use crate::span::{Span, Spanned, Syntax, Tree};
+use crate::span::{Span, Syntax, Tree};
 use crate::structure::Until;
 use crate::types::{EdgeKind, EdgeType, Precision};
 
@@ -35,7 +35,7 @@ pub(super) struct Frame<'a> {
 
 /// What a name stands for. `None` is something that is already known to be wrong.
 #[derive(Clone)]
-enum Entity {
+pub(super) enum Entity {
     Value(Option<ValueRef>),
     Node(Option<Vec<(String, ValueRef)>>),
 }
@@ -81,7 +81,7 @@ impl Resolver<'_> {
             let draft = drafts[index].take().expect("an order names each draft once");
             let name = draft.call.name.value.clone();
             if let What::Feedback { next, .. } = &draft.what {
-                delayed.push((name.clone(), next.clone()));
+                delayed.push((name.clone(), next.clone(), draft.options.when == Some(false)));
             }
             let entity = if self.count_nodes() > MOST_NODES {
                 self.diagnostics.push(Diagnostic::error(
@@ -94,10 +94,13 @@ impl Resolver<'_> {
             };
             scope.entities.insert(name, entity);
         }
-        for (name, next) in delayed {
+        for (name, next, bypassed) in delayed {
             let Some(Entity::Node(Some(ports))) = scope.entities.get(&name) else { continue };
             let at = ports[0].1;
-            if let Some(value) = self.lookup(&scope, frame, &next.value, next.span) {
+            // What a bypassed one names must be there all the same.
+            if let Some(value) = self.lookup(&scope, frame, &next.value, next.span)
+                && !bypassed
+            {
                 if let Work::Feedback { next, .. } = &mut self.level().dag[at.node].work {
                     *next = value;
                 }
@@ -249,7 +252,7 @@ impl Resolver<'_> {
         })
     }
 
-    fn capture(&mut self, level: usize, outside: ValueRef) -> ValueRef {
+    pub(super) fn capture(&mut self, level: usize, outside: ValueRef) -> ValueRef {
         if let Some(known) = self.levels[level].captures.get(&outside) {
             return *known;
         }
@@ -280,10 +283,13 @@ impl Resolver<'_> {
         let site = Settling { call, kind: kind.name, edges, options, inputs };
         match what {
             What::Node(node) => self.settle_node(site, node, frame),
-            What::Subgraph { file, inputs, params } => Entity::Node(self.settle_subgraph(&site, &file, &inputs, &params, frame)),
+            What::Subgraph(part) => self.settle_subgraph(site, &part, frame),
             What::Iterate(body) => Entity::Node(self.settle_iterate(site, &body, scope, frame)),
             What::Feedback { delay, .. } => {
                 let outputs = Output::out(self.ty(site.inputs[0]));
+                if site.options.when == Some(false) {
+                    return self.bypass(&site, site.inputs.first(), &outputs);
+                }
                 // `next` points at the node itself until the scope is complete.
                 let own = ValueRef { node: NodeIndex::new(self.level().dag.node_count()), port: 0 };
                 Entity::Node(Some(self.instance(site, Work::Feedback { next: own, delay }, outputs, frame)))
@@ -291,7 +297,7 @@ impl Resolver<'_> {
         }
     }
 
-    fn check_kind(&mut self, value: ValueRef, edge: &EdgeUse) -> bool {
+    pub(super) fn check_kind(&mut self, value: ValueRef, edge: &EdgeUse) -> bool {
         let ty = self.ty(value);
         if edge.kinds.contains(&ty.kind()) {
             return true;
@@ -309,7 +315,7 @@ impl Resolver<'_> {
         false
     }
 
-    fn settle_node(&mut self, site: Settling, mut node: Box<dyn Node>, frame: &Frame<'_>) -> Entity {
+    pub(super) fn settle_node(&mut self, site: Settling, mut node: Box<dyn Node>, frame: &Frame<'_>) -> Entity {
         if let Err(mistake) = node.open(&Opening { loader: self.loader, folder: frame.folder }) {
             self.note(&site, mistake, false);
             return Entity::Node(None);
@@ -341,7 +347,7 @@ impl Resolver<'_> {
             }
         }
         if site.options.when == Some(false) {
-            return self.bypass(&site, &outputs);
+            return self.bypass(&site, site.inputs.first(), &outputs);
         }
         if !self.check_repeat(&site, &types, &outputs) {
             return Entity::Node(None);
@@ -350,8 +356,8 @@ impl Resolver<'_> {
     }
 
     /// `when: false`: the first input passes through, to every port that is an edge of its type.
-    fn bypass(&mut self, site: &Settling, outputs: &[Output]) -> Entity {
-        let (Some(first), Some(out)) = (site.inputs.first(), outputs.first()) else {
+    pub(super) fn bypass(&mut self, site: &Settling, first: Option<&ValueRef>, outputs: &[Output]) -> Entity {
+        let (Some(first), Some(out)) = (first, outputs.first()) else {
             if outputs.is_empty() {
                 return Entity::Node(Some(Vec::new()));
             }
@@ -368,7 +374,7 @@ impl Resolver<'_> {
         Entity::Node(Some(alike.map(|out| (out.name.clone(), *first)).collect()))
     }
 
-    fn check_repeat(&mut self, site: &Settling, types: &[EdgeType], outputs: &[Output]) -> bool {
+    pub(super) fn check_repeat(&mut self, site: &Settling, types: &[EdgeType], outputs: &[Output]) -> bool {
         let mistake = match (site.options.repeat, types.first(), outputs.first()) {
             (None | Some(1), ..) => return true,
             (Some(0), ..) => {
@@ -389,85 +395,6 @@ impl Resolver<'_> {
         false
     }
 
-    fn settle_subgraph(
-        &mut self,
-        site: &Settling,
-        file: &Spanned<String>,
-        bound: &[(String, usize)],
-        params: &IndexMap<String, (Span, Tree)>,
-        frame: &Frame<'_>,
-    ) -> Option<Vec<(String, ValueRef)>> {
-        let path = frame.folder.join(&file.value);
-        if self.chain.contains(&normal(&path)) {
-            let chain: Vec<_> = self.chain.iter().chain([&normal(&path)]).map(|p| p.display().to_string()).collect();
-            self.diagnostics.push(
-                Diagnostic::error(file.span, format!("a subgraph that contains itself: {}", chain.join(" -> ")))
-                    .label("this closes the circle"),
-            );
-            return None;
-        }
-        let document = self.file(&path, file.span)?;
-        let mut env = Env::new();
-        for name in ["frame", "time"] {
-            env.set(name, frame.env.get(name).unwrap_or_default());
-        }
-        let mut names = IndexMap::new();
-        let mut fits = true;
-        for input in &document.inputs {
-            let name = &input.name.value;
-            let Some((_, edge)) = bound.iter().find(|(n, _)| n == name) else {
-                self.diagnostics.push(
-                    Diagnostic::error(site.call.kind.span, format!("missing input `{name}` of {}", file.value))
-                        .label(format!("expected `inputs: {{\"{name}\": \"NODE\"}}`")),
-                );
-                fits = false;
-                continue;
-            };
-            let value = site.inputs[*edge];
-            let use_ = EdgeUse { kinds: vec![input.kind], field: name.clone(), ..site.edges[*edge].clone() };
-            fits &= self.check_kind(value, &use_);
-            self.size_names(&mut env, name, self.ty(value));
-            names.insert(name.clone(), Some(value));
-        }
-        for (name, edge) in bound {
-            if !names.contains_key(name) && !document.inputs.iter().any(|i| i.name.value == *name) {
-                let inputs = site.call.fields.iter().find(|(key, _)| key.value == "inputs");
-                let span = inputs.and_then(|(_, tree)| key_span(tree, name)).unwrap_or(site.edges[*edge].span);
-                let known = document.inputs.iter().map(|i| i.name.value.as_str());
-                let d = Diagnostic::error(span, format!("{} has no input `{name}`", file.value)).label(list_of("inputs", known));
-                self.diagnostics.push(with_nearest(d, name, document.inputs.iter().map(|i| i.name.value.as_str())));
-                fits = false;
-            }
-        }
-        for (name, (span, _)) in params {
-            if !document.params.iter().any(|p| p.name.value == *name) {
-                let known = document.params.iter().map(|p| p.name.value.as_str());
-                let d = Diagnostic::error(*span, format!("{} has no parameter `{name}`", file.value)).label(list_of("parameters", known));
-                self.diagnostics.push(with_nearest(d, name, document.params.iter().map(|p| p.name.value.as_str())));
-            }
-        }
-        if !fits {
-            return None;
-        }
-        let prefix = format!("{}{}/", frame.prefix, site.call.name.value);
-        let given = params.iter().map(|(name, (_, value))| (name.clone(), value.clone())).collect();
-        self.params(&document, &given, &prefix, &mut env);
-        let folder = path.parent().unwrap_or(Path::new("")).to_owned();
-        self.chain.push(normal(&path));
-        let inner = Frame { prefix: &prefix, env: &env, folder: &folder, outer: None };
-        let scope = self.scope(&document.nodes, names, &inner);
-        let mut ports = Vec::new();
-        let mut complete = true;
-        for (name, edge) in &document.outputs {
-            match self.lookup(&scope, &inner, &edge.value, edge.span) {
-                Some(value) => ports.push((name.value.clone(), value)),
-                None => complete = false,
-            }
-        }
-        self.chain.pop();
-        complete.then_some(ports)
-    }
-
     fn settle_iterate(&mut self, site: Settling, parts: &Body, scope: &Scope, frame: &Frame<'_>) -> Option<Vec<(String, ValueRef)>> {
         let types: Vec<EdgeType> = site.inputs.iter().map(|v| self.ty(*v)).collect();
         self.levels.push(Level::default());
@@ -476,16 +403,7 @@ impl Resolver<'_> {
         let mut names = IndexMap::new();
         for (position, (name, edge)) in parts.states.iter().enumerate() {
             self.size_names(&mut env, name, types[*edge]);
-            let node = self.level().dag.add_node(Instance {
-                name: name.clone(),
-                kind: "State",
-                span: site.edges[*edge].span,
-                work: Work::State(position),
-                inputs: Vec::new(),
-                outputs: Output::out(types[*edge]),
-                options: Options::default(),
-            });
-            names.insert(name.clone(), Some(ValueRef { node, port: 0 }));
+            names.insert(name.clone(), Some(self.state(position, name, types[*edge], site.edges[*edge].span)));
         }
         let prefix = format!("{}{}/", frame.prefix, site.call.name.value);
         let inner = Frame { prefix: &prefix, env: &env, folder: frame.folder, outer: Some((scope, frame)) };
@@ -516,13 +434,29 @@ impl Resolver<'_> {
         if next.len() < parts.states.len() {
             return None;
         }
-        let order = level.dag.node_indices().collect();
-        let graph = Graph { name: prefix.clone(), dag: level.dag, order, inputs: IndexMap::new(), outputs: IndexMap::new() };
-        let work = Work::Iterate(Box::new(Iteration { body: graph, next, times: times? }));
+        let work = Work::Iterate(Box::new(Iteration { body: body_graph(prefix, level.dag), next, times: times? }));
+        // Bypassed, it is a loop that never runs: every state leaves as it came.
+        if site.options.when == Some(false) {
+            return Some(parts.states.iter().map(|(name, edge)| (name.clone(), site.inputs[*edge])).collect());
+        }
         let outputs = parts.states.iter().map(|(name, edge)| Output::new(name.clone(), types[*edge])).collect();
         let mut site = site;
         site.inputs = parts.states.iter().map(|(_, edge)| site.inputs[*edge]).chain(level.captures.into_keys()).collect();
         Some(self.instance(site, work, outputs, frame))
+    }
+
+    /// In a body: the value that changes from one iteration to the next.
+    pub(super) fn state(&mut self, position: usize, name: &str, ty: EdgeType, span: Span) -> ValueRef {
+        let node = self.level().dag.add_node(Instance {
+            name: name.to_owned(),
+            kind: "State",
+            span,
+            work: Work::State(position),
+            inputs: Vec::new(),
+            outputs: Output::out(ty),
+            options: Options::default(),
+        });
+        ValueRef { node, port: 0 }
     }
 
     fn times(&mut self, parts: &Body, site: &Settling, body: &Scope, inner: &Frame<'_>) -> Option<Times> {
@@ -547,7 +481,7 @@ impl Resolver<'_> {
     }
 
     /// Makes the instance and its wires; answers its ports.
-    fn instance(&mut self, site: Settling, work: Work, outputs: Vec<Output>, frame: &Frame<'_>) -> Vec<(String, ValueRef)> {
+    pub(super) fn instance(&mut self, site: Settling, work: Work, outputs: Vec<Output>, frame: &Frame<'_>) -> Vec<(String, ValueRef)> {
         let dag = &mut self.level().dag;
         let names: Vec<String> = outputs.iter().map(|o| o.name.clone()).collect();
         let inputs = site.inputs.clone();
@@ -593,7 +527,7 @@ impl Resolver<'_> {
         self.diagnostics.push(d);
     }
 
-    fn ty(&self, value: ValueRef) -> EdgeType {
+    pub(super) fn ty(&self, value: ValueRef) -> EdgeType {
         let level = self.levels.last().expect("there is always the file's own level");
         level.dag[value.node].outputs[value.port].ty
     }
@@ -604,12 +538,18 @@ impl Resolver<'_> {
 }
 
 /// A draft whose edges are looked up.
-struct Settling {
-    call: Call,
-    kind: &'static str,
-    edges: Vec<EdgeUse>,
-    options: Options,
-    inputs: Vec<ValueRef>,
+pub(super) struct Settling {
+    pub(super) call: Call,
+    pub(super) kind: &'static str,
+    pub(super) edges: Vec<EdgeUse>,
+    pub(super) options: Options,
+    pub(super) inputs: Vec<ValueRef>,
+}
+
+/// The graph of a body. Instances are made after those they read, so that their indices are a topological order.
+pub(super) fn body_graph(name: String, dag: DiGraph<Instance, Wire>) -> Graph {
+    let order = dag.node_indices().collect();
+    Graph { name, dag, order, inputs: IndexMap::new(), outputs: IndexMap::new() }
 }
 
 /// Whether a value may take the place of another from one iteration to the next: precision may differ.
@@ -633,18 +573,6 @@ fn impossible(output: &Output) -> Option<Mistake> {
     wrong.then(|| {
         Mistake::new(format!("would make an {} as `{}`", output.ty, output.name)).hint("every size must be at least 1 and of this world")
     })
-}
-
-/// Where a map has this key.
-fn key_span(tree: &Tree, name: &str) -> Option<Span> {
-    let Syntax::Map(entries) = &tree.value else { return None };
-    entries.iter().map(|(key, _)| key).find(|key| matches!(&key.value, Syntax::Text(text) if text == name)).map(|key| key.span)
-}
-
-/// `its inputs are a, b`
-fn list_of<'n>(what: &str, names: impl Iterator<Item = &'n str>) -> String {
-    let names: Vec<_> = names.collect();
-    if names.is_empty() { format!("it has no {what}") } else { format!("its {what} are {}", names.join(", ")) }
 }
 
 /// Texts in an `Iterate` body that may name something outside it.

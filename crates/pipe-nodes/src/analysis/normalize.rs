@@ -37,7 +37,12 @@ enum Ends {
     /// Smallest and largest luminance.
     MinMax,
     /// Percentiles of the luminance.
-    Percentile(f32, f32),
+    Percentile {
+        /// Per cent of the pixels below low.
+        lo: f32,
+        /// Per cent of the pixels below high.
+        hi: f32,
+    },
 }
 
 pub(crate) const KIND: Kind = Kind::of::<Normalize>(
@@ -48,7 +53,7 @@ pub(crate) const KIND: Kind = Kind::of::<Normalize>(
         r#"Normalize(image: "in", low: "scalar", high: 9, g_max: 255)"#,
         r#"Normalize(image: "in", from: MinMax)"#,
         r#"Normalize(image: "grey", from: Percentile(1, 99))"#,
-        r#"Normalize(image: "in", from: Percentile(0.5, 100), g_max: 2)"#,
+        r#"Normalize(image: "in", from: Percentile(lo: 0.5, hi: 100), g_max: 2)"#,
         r#"Normalize(image: "pair", from: MinMax)"#,
     ],
 );
@@ -56,7 +61,7 @@ pub(crate) const KIND: Kind = Kind::of::<Normalize>(
 impl Node for Normalize {
     fn open(&mut self, _: &Opening<'_>) -> Result<(), Mistake> {
         match self.from {
-            Ends::Percentile(lo, hi) if ![lo, hi].iter().all(|p| (0.0..=100.0).contains(p)) => {
+            Ends::Percentile { lo, hi } if ![lo, hi].iter().all(|p| (0.0..=100.0).contains(p)) => {
                 Err(Mistake::in_field("from", format!("there are no percentiles {lo} and {hi}"))
                     .hint("percentiles lie between 0 and 100: `Percentile(1, 99)`"))
             }
@@ -76,7 +81,7 @@ impl Node for Normalize {
                 let extent = reduction::extent(cx, "extent", image, View::Luminance);
                 [Value::Driven(extent.min), Value::Driven(extent.max)]
             }
-            Ends::Percentile(lo, hi) => {
+            Ends::Percentile { lo, hi } => {
                 let fractions = [lo, hi].map(|p| f64::from(p) / 100.0);
                 let found = quantiles(cx, "percentile", image, View::Luminance, &fractions);
                 [Value::Driven(found[0]), Value::Driven(found[1])]
@@ -103,7 +108,7 @@ impl Node for Normalize {
                 let end = |f: fn(f64, f64) -> f64| y.iter().copied().reduce(f).unwrap_or(0.0);
                 (end(f64::min), end(f64::max))
             }
-            Ends::Percentile(lo, hi) => {
+            Ends::Percentile { lo, hi } => {
                 let y = luminances();
                 let at = |p: f32| quantile_reference(&y, f64::from(p) / 100.0);
                 (at(lo), at(hi))

@@ -7,7 +7,7 @@ use smart_default::SmartDefault;
 /// Computes each channel by an expression over the pixels of up to three images: `a.r`, `a.g`, `a.b`, `a.a`, `b.r` …
 /// `c.a`, the pixel index `x`, `y` (from 0, the upper left) and `width`, `height`. There are numbers, `pi`, `e`,
 /// `+ - * / % ^`, `< <= > >= == !=` (1 or 0), `&& || !`, and min max floor ceil round fract abs sign sqrt exp log sin cos tan
-/// pow clamp mix step if. Becomes GPU code that fuses with its neighbours.
+/// pow clamp mix step if; min and max take two arguments or more. Becomes GPU code that fuses with its neighbours.
 ///
 /// A channel without an expression is that of `a`. The result has the channels of `a`, or four when `green`, `blue` or
 /// `alpha` is given and `a` has none.
