@@ -168,7 +168,7 @@ fn required_inputs(schema: &Schema) -> Vec<String> {
 }
 
 /// `minimum` and the like hold for every number of a field.
-fn check_ranges(schema: &Schema, fields: &[(Spanned<String>, Tree)], env: &Env, diagnostics: &mut Vec<Diagnostic>) {
+pub(crate) fn check_ranges(schema: &Schema, fields: &[(Spanned<String>, Tree)], env: &Env, diagnostics: &mut Vec<Diagnostic>) {
     let Some(properties) = schema.get("properties").and_then(|p| p.as_object()) else { return };
     for (key, value) in fields {
         let Some(property) = properties.get(&key.value) else { continue };

@@ -4,7 +4,7 @@ use indexmap::IndexMap;
 
 use super::scope::Frame;
 use super::{Given, Resolver, field_of};
-use crate::de::{EdgeUse, build_node, from_tree};
+use crate::de::{EdgeUse, build_node, check_ranges, from_tree};
 use crate::diagnostic::Diagnostic;
 use crate::document::{Call, Field, Reader, with_nearest};
 use crate::field::In;
@@ -60,9 +60,9 @@ fn take(fields: &mut Vec<Field>, name: &str) -> Option<Field> {
 }
 
 impl Resolver<'_> {
-    /// Reads one call. `None` when it cannot stand: the mistakes are noted.
-    pub(super) fn draft(&mut self, call: &Call, frame: &Frame<'_>) -> Option<Draft> {
-        let kind = self.registry.get(&call.kind.value)?;
+    /// Reads one call. When it cannot stand, the mistakes are noted, and it answers the edges that it names all the same.
+    pub(super) fn draft(&mut self, call: &Call, frame: &Frame<'_>) -> Result<Draft, Vec<EdgeUse>> {
+        let kind = self.registry.get(&call.kind.value).ok_or_else(Vec::new)?;
         let mut call = call.clone();
         self.apply_settings(&mut call, frame.prefix);
         let options = call.options.as_ref().map_or_else(Options::default, |tree| {
@@ -72,16 +72,19 @@ impl Resolver<'_> {
             options.unwrap_or_default()
         });
         let (what, edges) = match kind.name {
-            "Subgraph" => self.draft_subgraph(&mut call, frame)?,
-            "Iterate" => self.draft_iterate(&mut call, frame)?,
-            "Feedback" => self.draft_feedback(&mut call, frame)?,
+            "Subgraph" => self.draft_subgraph(&mut call, frame).ok_or_else(Vec::new)?,
+            "Iterate" => self.draft_iterate(&mut call, frame).ok_or_else(Vec::new)?,
+            "Feedback" => self.draft_feedback(&mut call, frame).ok_or_else(Vec::new)?,
             _ => {
                 let built = build_node(kind, &call.fields, call.kind.span, frame.env);
                 self.diagnostics.extend(built.diagnostics);
-                (What::Node(built.node?), built.edges)
+                match built.node {
+                    Some(node) => (What::Node(node), built.edges),
+                    None => return Err(built.edges),
+                }
             }
         };
-        Some(Draft { call, kind, what, edges, options })
+        Ok(Draft { call, kind, what, edges, options })
     }
 
     /// Options that would say nothing of a node which shapes the graph and makes no pixels itself.
@@ -208,12 +211,14 @@ impl Resolver<'_> {
         Some((What::Feedback { next: Spanned { span: next, value: fields.next }, delay: fields.delay }, edges))
     }
 
-    fn structure_fields<T: serde::de::DeserializeOwned>(
+    fn structure_fields<T: serde::de::DeserializeOwned + schemars::JsonSchema>(
         &self,
         call: &Call,
         frame: &Frame<'_>,
     ) -> (Option<T>, Vec<EdgeUse>, Vec<Diagnostic>) {
         let tree = Tree { span: call.kind.span, value: Syntax::Struct(Some(call.kind.clone()), call.fields.clone()) };
-        from_tree::<T>(&tree, frame.env)
+        let (fields, edges, mut mistakes) = from_tree::<T>(&tree, frame.env);
+        check_ranges(&schemars::schema_for!(T), &call.fields, frame.env, &mut mistakes);
+        (fields.filter(|_| mistakes.is_empty()), edges, mistakes)
     }
 }

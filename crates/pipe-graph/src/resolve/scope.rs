@@ -16,7 +16,7 @@ use crate::diagnostic::Diagnostic;
 use crate::document::{Call, with_nearest};
 use crate::expr::Env;
 use crate::graph::{Format, Graph, Instance, Iteration, Options, Times, ValueRef, Wire, Work};
-use crate::node::{Inputs, Mistake, Node, Opening, Output};
+use crate::node::{Category, Inputs, Kind, Mistake, Node, Opening, Output};
 use crate::span::{Span, Syntax, Tree};
 use crate::structure::Until;
 use crate::types::{EdgeKind, EdgeType, Precision};
@@ -46,12 +46,20 @@ pub(super) struct Scope {
     entities: IndexMap<String, Entity>,
     /// Names of all nodes, of those too that are not settled yet.
     calls: Vec<String>,
+    /// What they are, as far as that is known.
+    kinds: IndexMap<String, &'static Kind>,
 }
 
 impl Scope {
     /// Every name that can be meant.
     fn names(&self) -> impl Iterator<Item = &str> {
         self.entities.keys().chain(&self.calls).map(String::as_str)
+    }
+
+    /// The ports of a node in which there is some mistake: those of its kind, where all nodes of the kind have the same.
+    fn ports_of_kind(&self, name: &str) -> Option<Vec<&'static str>> {
+        let kind = self.kinds.get(name).filter(|kind| kind.category != Category::Structure)?;
+        Some(kind.ports.iter().map(|(port, _)| *port).collect())
     }
 }
 
@@ -65,12 +73,17 @@ impl Resolver<'_> {
         let mut calls: Vec<&Call> = calls.iter().collect();
         calls.sort_by(|a, b| a.name.value.cmp(&b.name.value));
         scope.calls = calls.iter().map(|c| c.name.value.clone()).collect();
+        let named = |call: &&Call| Some((call.name.value.clone(), self.registry.get(&call.kind.value)?));
+        scope.kinds = calls.iter().filter_map(named).collect();
         let mut drafts = Vec::new();
+        // What nodes name in which there is some other mistake.
+        let mut others = Vec::new();
         for call in calls {
             match self.draft(call, frame) {
-                Some(draft) => drafts.push(draft),
-                None => {
+                Ok(draft) => drafts.push(draft),
+                Err(edges) => {
                     scope.entities.insert(call.name.value.clone(), Entity::Node(None));
+                    others.extend(edges);
                 }
             }
         }
@@ -93,6 +106,9 @@ impl Resolver<'_> {
                 self.settle(draft, &scope, frame)
             };
             scope.entities.insert(name, entity);
+        }
+        for edge in others {
+            self.lookup(&scope, frame, &edge.text, edge.span);
         }
         for (name, next, bypassed) in delayed {
             let Some(Entity::Node(Some(ports))) = scope.entities.get(&name) else { continue };
@@ -201,8 +217,15 @@ impl Resolver<'_> {
                 }
                 value
             }
-            Some(Entity::Node(ports)) => {
-                let ports = ports?;
+            Some(Entity::Node(None)) => {
+                if let (Some(port), Some(names)) = (port, scope.ports_of_kind(name))
+                    && !names.contains(&port)
+                {
+                    self.no_port(span, name, port, names);
+                }
+                None
+            }
+            Some(Entity::Node(Some(ports))) => {
                 let found = match port {
                     None => ports.first(),
                     Some(port) => ports.iter().find(|(n, _)| n == port),
@@ -210,16 +233,13 @@ impl Resolver<'_> {
                 if let Some((_, value)) = found {
                     return Some(*value);
                 }
-                let names: Vec<_> = ports.iter().map(|(n, _)| n.as_str()).collect();
-                let d = match port {
-                    Some(port) => Diagnostic::error(span, format!("`{name}` has no port `{port}`")).label(if names.is_empty() {
-                        "it has none".to_owned()
-                    } else {
-                        format!("its ports are {}", names.join(", "))
-                    }),
-                    None => Diagnostic::error(span, format!("`{name}` has no outputs")).label("nothing can be read from it"),
-                };
-                self.diagnostics.push(with_nearest(d, port.unwrap_or_default(), names));
+                match port {
+                    Some(port) => self.no_port(span, name, port, ports.iter().map(|(n, _)| n.as_str()).collect()),
+                    None => {
+                        let d = Diagnostic::error(span, format!("`{name}` has no outputs")).label("nothing can be read from it");
+                        self.diagnostics.push(d);
+                    }
+                }
                 None
             }
             None => {
@@ -238,6 +258,12 @@ impl Resolver<'_> {
                 None
             }
         }
+    }
+
+    fn no_port(&mut self, span: Span, name: &str, port: &str, names: Vec<&str>) {
+        let label = if names.is_empty() { "it has none".to_owned() } else { format!("its ports are {}", names.join(", ")) };
+        let d = Diagnostic::error(span, format!("`{name}` has no port `{port}`")).label(label);
+        self.diagnostics.push(with_nearest(d, port, names));
     }
 
     /// What a name stands for, seen from a level; a value of an outer scope is captured on its way in.

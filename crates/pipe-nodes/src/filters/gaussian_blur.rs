@@ -15,7 +15,7 @@ pub(super) struct GaussianBlur {
     /// The image.
     image: In<Image>,
     /// Standard deviation: one number, or (σx, σy).
-    #[schemars(range(min = 0.0, max = 1000.0), extend("x-unit" = "px"))]
+    #[schemars(extend("minimum" = 0.0, "maximum" = 1000.0, "x-unit" = "px"))]
     sigma: Sigma,
     /// How it is computed. `Separable` is exact with radius ceil(3σ). `Recursive` costs the same for every σ, `Pyramid` less
     /// for larger ones, for it works on a smaller image; both are within 1e-3 of the range of the (unbounded) Gaussian.
