@@ -43,6 +43,12 @@ pub(super) const KIND: Kind = Kind::of::<BoxBlur>(
 )
 .tolerance(2e-6, 1e-5);
 
+/// No longer than a window, and even where that matters.
+const fn run_of(window: u32, longest: u32) -> u32 {
+    let run = if window < longest { window } else { longest };
+    if run > 8 { run / 8 * 8 } else { run }
+}
+
 /// Declares the mean of `image` over (2r + 1)² pixels.
 pub(super) fn box_mean(cx: &mut Lowering<'_>, prefix: &str, r: u32, image: ResourceId, out: ResourceId) {
     let shape = cx.shape(out);
@@ -61,7 +67,7 @@ pub(super) fn box_mean(cx: &mut Lowering<'_>, prefix: &str, r: u32, image: Resou
             pass.write("out", to).constant("RADIUS", r as i32).constant("RUN", run as i32).constant("ALONG_X", along_x).add();
         };
         if r <= most {
-            pass(cx, suffix, shader!("filters/box_run"), window.min(longest), None, to);
+            pass(cx, suffix, shader!("filters/box_run"), run_of(window, longest), None, to);
         } else {
             let name = format!("{suffix}.left");
             let left = cx.intermediate(&format!("{prefix}{name}"), shape);
