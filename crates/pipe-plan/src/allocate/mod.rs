@@ -184,7 +184,8 @@ fn readers(ops: &Ops, portions: &[Portion]) -> BTreeMap<ResourceId, usize> {
             match op {
                 Op::Pass(pass) => pass.sources().for_each(|id| *count.entry(id).or_default() += 1),
                 Op::Loop(l) => {
-                    l.states.iter().for_each(|s| *count.entry(s.init).or_default() += 1);
+                    // The next value of a state may come from outside, too.
+                    l.states.iter().flat_map(|s| [s.init, s.next]).for_each(|id| *count.entry(id).or_default() += 1);
                     walk(&l.body, count);
                 }
             }
