@@ -10,6 +10,11 @@ fn is_finite(x: f32) -> bool {
     return (bitcast<u32>(x) & 0x7f800000u) != 0x7f800000u;
 }
 
+/// Which components are NaN or ±infinity.
+fn not_finite(v: vec4f) -> vec4<bool> {
+    return (bitcast<vec4u>(v) & vec4u(0x7f800000u)) == vec4u(0x7f800000u);
+}
+
 /// |x|^p with the sign of x; NaN stays NaN. WGSL leaves pow of a negative base undefined.
 fn signed_pow(x: f32, p: f32) -> f32 {
     if is_nan(x) || x == 0.0 {

@@ -1,5 +1,7 @@
 // Sums of many terms that carry their rounding error along (Neumaier 1974).
 
+import package::lib::number::not_finite;
+
 struct Running {
     sum: vec4f,
     lost: vec4f,
@@ -13,6 +15,5 @@ fn plus(to: Running, v: vec4f) -> Running {
 
 /// The sum. What an infinite one lost is no number.
 fn total(terms: Running) -> vec4f {
-    let infinite = (bitcast<vec4u>(terms.sum) & vec4u(0x7f800000u)) == vec4u(0x7f800000u);
-    return select(terms.sum + terms.lost, terms.sum, infinite);
+    return select(terms.sum + terms.lost, terms.sum, not_finite(terms.sum));
 }

@@ -190,7 +190,7 @@ pub(crate) fn limits(adapter: &wgpu::Adapter) -> Limits {
         max_groups: l.max_compute_workgroups_per_dimension,
         half_storage: adapter.features().contains(Features::TEXTURE_ADAPTER_SPECIFIC_FORMAT_FEATURES) && half.into_iter().all(storable),
         // What drivers of GPUs say here is less than they give.
-        max_piece: largest_piece(adapter).filter(|_| cpu).unwrap_or(u64::MAX),
+        max_piece: if cpu { largest_piece(adapter).unwrap_or(u64::MAX) } else { u64::MAX },
         budget: if cpu { available_memory() } else { own_memory(adapter).map(|bytes| bytes / 8 * 7) },
         tiled: false,
     }

@@ -93,7 +93,7 @@ pub fn check(path: &str, text: &str, stubs: &str, library: &[(&str, &str)], sign
     let mut whole = blank_imports(text);
     whole.push('\n');
     whole.push_str(stubs);
-    for (_, module) in library {
+    for module in tokens::imported(text, library) {
         whole.push_str(&blank_imports(module));
         whole.push('\n');
     }
@@ -198,6 +198,13 @@ mod tests {
         assert!(error.contains("^^^^"), "{error}");
         let good = text.replace("gian", "params.gain");
         assert_eq!(check("glow.wgsl", &good, &common_stubs(&[("gain".into(), "f32")]), LIBRARY, None), Ok(()));
+    }
+
+    #[test]
+    fn names_of_modules_that_are_not_imported_are_free() {
+        let text = "import package::lib::color::luminance;\nfn total(c: vec4f) -> f32 { return luminance(c.rgb); }\n\
+                    fn plus(a: f32) -> f32 { return a; }\nfn apply(image: vec4f) -> vec4f { return vec4f(plus(total(image))); }\n";
+        assert_eq!(check("own.wgsl", text, &common_stubs(&[]), LIBRARY, None), Ok(()));
     }
 
     #[test]

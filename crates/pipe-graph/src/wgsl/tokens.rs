@@ -110,6 +110,29 @@ pub(super) fn forbidden(text: &str, known: &[(&str, &str)]) -> Option<(String, R
     None
 }
 
+/// The modules that a shader imports from, and those that they do: no name of any other is taken.
+pub(super) fn imported<'l>(text: &str, known: &[(&str, &'l str)]) -> Vec<&'l str> {
+    let named = |text: &str| -> Vec<usize> {
+        let words = tokens(text);
+        // `lib`, two colons, the module.
+        let modules = words.windows(4).filter(|w| w[0].text == "lib" && w[1].text == ":" && w[2].text == ":").map(|w| w[3].text);
+        modules.filter_map(|module| known.iter().position(|(name, _)| *name == module)).collect()
+    };
+    let mut found = named(text);
+    let mut at = 0;
+    while let Some(module) = found.get(at) {
+        for further in named(known[*module].1) {
+            if !found.contains(&further) {
+                found.push(further);
+            }
+        }
+        at += 1;
+    }
+    found.sort_unstable();
+    found.dedup();
+    found.into_iter().map(|module| known[module].1).collect()
+}
+
 /// Whether a declaration may begin here.
 fn starts_line(tokens: &[Token<'_>], i: usize) -> bool {
     i == 0 || matches!(tokens[i - 1].text, ";" | "}")
@@ -164,6 +187,14 @@ mod tests {
         assert_eq!(bounded.matches("{ if pipe_too_long() { break; } ").count(), 3, "{bounded}");
         assert_eq!(bounded.lines().count(), text.lines().count());
         assert_eq!(super::bounded("fn forward(loops: i32) {} /* for { /* */ } */"), None);
+    }
+
+    #[test]
+    fn modules_bring_those_that_they_import() {
+        let known = [("a", "import package::lib::b::f;\nA"), ("b", "import package::lib::a::g;\nB"), ("c", "C")];
+        let ends = |text: &str| imported(text, &known).iter().map(|module| &module[module.len() - 1..]).collect::<String>();
+        assert_eq!(ends("import package::lib::a::{g, h};\nfn total() {}"), "AB");
+        assert_eq!(ends("// import package::lib::c::x;\nfn at() {}"), "");
     }
 
     #[test]
